@@ -9,12 +9,12 @@ import anyio
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.ros.robot import RosRobot
-from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, running
 
@@ -171,7 +171,7 @@ async def connect_scripted(
     scripted: ScriptedRobot,
     *,
     timing: Timing,
-    patience: DrivingPatience,
+    patience: Patience,
     overrides: RobotOverrides | None = None,
 ) -> AsyncGenerator[RosRobot]:
     """Gives the robot that a scripted rosbridge plays; all of it has to be over in time."""

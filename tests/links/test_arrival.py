@@ -15,8 +15,8 @@ from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
@@ -37,9 +37,7 @@ class Desk:
     def __init__(self) -> None:
         self.url = NOBODY
         self.arrival = Arrival(
-            lambda: open_rosbridge_robot(
-                self.url, timing=QUICK, patience=DrivingPatience(settling_s=0.0)
-            )
+            lambda: open_rosbridge_robot(self.url, timing=QUICK, patience=Patience(settling_s=0.0))
         )
 
     @asynccontextmanager

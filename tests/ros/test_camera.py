@@ -6,14 +6,14 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge import Timing
-from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.robot.sensors import RosCamera
 from rosbridge_robot import ScriptedRobot, connect_scripted
 
 pytestmark = pytest.mark.anyio
 
 QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
-PATIENCE = DrivingPatience(settling_s=0.0)
+PATIENCE = Patience(settling_s=0.0)
 TOPIC = "/camera/image_raw"
 
 

@@ -12,11 +12,11 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import RangeScan
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.ros.messages.scans import LaserScan, write_scan
-from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.robot.sensors import Laser
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import Operation
@@ -24,7 +24,7 @@ from rosbridge_script import Operation
 pytestmark = pytest.mark.anyio
 
 QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
-PATIENT = DrivingPatience(settling_s=0.0)
+PATIENT = Patience(settling_s=0.0)
 NOW_S = 100.0
 """What the scripted robot answers when it is asked for the time."""
 BASE = Pose(1.0, 2.0, 0.5)

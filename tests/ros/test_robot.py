@@ -10,19 +10,19 @@ from mapspeak.cli.checkup import Health, describe_profile
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.profile import NavigationKind, PoseSource
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.robot import RosRobot
-from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted
 from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
 
 QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
-PATIENT = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=PATIENCE_S)
-IMPATIENT = DrivingPatience(settling_s=0.0)
+PATIENT = Patience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=PATIENCE_S)
+IMPATIENT = Patience(settling_s=0.0)
 N_LOOKS = 3
 MAP = """
 ###

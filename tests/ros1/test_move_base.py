@@ -9,14 +9,14 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
-from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.ros.actions import Patience
 from ros2.robot_process import RobotProcess
 
 pytestmark = [pytest.mark.ros1, pytest.mark.anyio]
 
 PATIENCE_S = 60.0
 NEXT_ROOM = Pose(6.0, 1.4)
-BRIEF = DrivingPatience(acceptance_s=1.0)
+BRIEF = Patience(acceptance_s=1.0)
 STANDS_M = 0.2
 
 

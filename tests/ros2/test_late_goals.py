@@ -12,14 +12,14 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rclpy import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.robot import GoalState
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.robot import RosRobot
-from mapspeak.ros.robot.driving import DrivingPatience
 from ros2.robot_process import RobotProcess
 
 pytestmark = [pytest.mark.ros2, pytest.mark.anyio]
 
 NEXT_ROOM, NEARER = Pose(8.0, 2.25), Pose(3.0, 2.25)
-SHORT = DrivingPatience(acceptance_s=0.5)
+SHORT = Patience(acceptance_s=0.5)
 LATE_S = 2.0
 PATIENCE_S = 30.0
 SPEED_MPS = 2.0

@@ -13,8 +13,8 @@ from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_script import PATIENCE_S
@@ -24,8 +24,8 @@ pytestmark = pytest.mark.anyio
 
 RATE = 5.0
 STILL_M = 0.2
-SHORT = DrivingPatience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.5, settling_s=0.0)
+SHORT = Patience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
+LONG = Patience(acceptance_s=PATIENCE_S, end_s=0.5, settling_s=0.0)
 QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, answer_s=0.5)
 BOTH = pytest.mark.parametrize("dialect", list(Dialect))
 
@@ -35,7 +35,7 @@ async def driving(
     folder: Path,
     dialect: Dialect,
     *,
-    patience: DrivingPatience = LONG,
+    patience: Patience = LONG,
     faults: Faults,
     speed_mps: float = 0.5,
 ) -> AsyncGenerator[tuple[FaultyBridge, Caller]]:

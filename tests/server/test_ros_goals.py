@@ -13,7 +13,7 @@ from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal
+from mapspeak.ros.actions import ActionState, Patience, SentGoal
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.poses import write_pose
 from mapspeak.safety import CommandKind, Policy
@@ -30,7 +30,7 @@ both = pytest.mark.parametrize("dialect", Dialect)
 ACTION = "/navigate_to_pose"
 POSE = {"header": {"frame_id": "map"}, "pose": {"position": {"x": 1.0}, "orientation": {"w": 1.0}}}
 GOAL = {"pose": POSE}
-BRIEF = ActionPatience(acceptance_s=0.3, listing_s=0.05, end_s=0.1, result_s=0.0, return_s=0.05)
+BRIEF = Patience(acceptance_s=0.3, listing_s=0.05, end_s=0.1, result_s=0.0, return_s=0.05)
 OURS, OTHERS = bytes(range(16)), bytes(range(16, 32))
 
 

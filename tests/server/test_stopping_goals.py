@@ -13,8 +13,8 @@ from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from guarding import MONDAY_NOON, make_guard
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.safety import CommandKind, Guard, Patterns, Policy
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
@@ -25,8 +25,8 @@ from rosserved import QUICK, Caller
 pytestmark = pytest.mark.anyio
 
 RATE = 5.0
-SHORT = DrivingPatience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=2.0, settling_s=0.0)
+SHORT = Patience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
+LONG = Patience(acceptance_s=PATIENCE_S, end_s=2.0, settling_s=0.0)
 PATROL = "/patrol"
 EXECUTING = 2
 TYPE = "nav2_msgs/action/FollowWaypoints"
@@ -116,7 +116,7 @@ async def test_a_goal_to_navigation_that_a_ros_tool_sent_is_no_other_clients(
 async def test_a_stop_that_cannot_end_a_goal_says_which(tmp_path: Path) -> None:
     scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
     scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
-    brief = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.1, settling_s=0.0)
+    brief = Patience(acceptance_s=PATIENCE_S, end_s=0.1, settling_s=0.0)
     async with (
         connect_scripted(scripted, timing=QUICK, patience=brief) as robot,
         serving(robot, tmp_path) as (_, caller),
@@ -177,7 +177,7 @@ def velocities(scripted: ScriptedRobot, topic: str) -> list[float]:
 
 @asynccontextmanager
 async def driving(
-    folder: Path, *, patience: DrivingPatience, faults: Faults
+    folder: Path, *, patience: Patience, faults: Faults
 ) -> AsyncGenerator[tuple[FaultyBridge, Caller]]:
     with anyio.fail_after(PATIENCE_S):
         async with (
@@ -215,7 +215,7 @@ async def test_a_goal_that_was_called_rejected_does_not_drive_the_robot_later(
 
 
 async def test_the_base_is_stopped_when_navigation_dies_under_a_drive(tmp_path: Path) -> None:
-    watchful = DrivingPatience(acceptance_s=PATIENCE_S, return_s=0.3, settling_s=0.0)
+    watchful = Patience(acceptance_s=PATIENCE_S, return_s=0.3, settling_s=0.0)
     faults = Faults(has_watchdog=False)
     async with driving(tmp_path, patience=watchful, faults=faults) as (bridge, caller):
         await send(caller, "navigate_to")

@@ -14,7 +14,7 @@ from dds_node import until as until_so
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.ros.actions import ActionPatience, ActionState, open_action
+from mapspeak.ros.actions import ActionState, Patience, open_action
 from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.messages.fields import Dialect
 
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.anyio
 ACTION, TYPE = "/count", "example_interfaces/action/Fibonacci"
 CANCEL_TYPE = "action_msgs/srv/CancelGoal"
 UNKNOWN_GOAL = 2
-BRIEF = ActionPatience(acceptance_s=0.3, listing_s=0.0)
+BRIEF = Patience(acceptance_s=0.3, listing_s=0.0)
 EXECUTING, SUCCEEDED, CANCELED, ABORTED = 2, 4, 5, 6
 
 
@@ -248,7 +248,7 @@ async def test_a_goal_that_is_taken_too_late_is_cancelled_at_once(
         if is_stopped:
             await client.end()
         counter.take_late()
-        assert await goal.wait_until_settled(within_s=5.0)
+        assert await goal.wait_until(lambda: goal.is_settled, within_s=5.0)
     assert counter.statuses == {bytes.fromhex(goal.id): CANCELED}
     assert "cancelled at once" in goal.afterwards
 
@@ -264,7 +264,7 @@ async def test_a_goal_that_was_ended_before_it_was_taken_is_cancelled_when_it_is
         assert goal.state is ActionState.CANCELLED
         await until_so(lambda: counter.late)
         counter.take_late()
-        assert await goal.wait_until_settled(within_s=5.0)
+        assert await goal.wait_until(lambda: goal.is_settled, within_s=5.0)
     assert counter.statuses == {bytes.fromhex(goal.id): CANCELED}
 
 

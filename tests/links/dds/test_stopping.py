@@ -6,12 +6,12 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from dds_node import open_both, until
 from mapspeak.errors import LinkError
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.robot import build_ros_robot
-from mapspeak.ros.robot.driving import DrivingPatience
 
 pytestmark = pytest.mark.anyio
 
-AT_ONCE = DrivingPatience(settling_s=0.0)
+AT_ONCE = Patience(settling_s=0.0)
 
 
 async def test_a_stop_with_no_robot_there_says_that_nobody_was_told() -> None:

@@ -11,10 +11,10 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect, write_stamp
 from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
 from mapspeak.ros.robot import RosRobot
-from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import STATUS_TOPIC, ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation
 
@@ -27,8 +27,8 @@ QUICK = Timing(
     goodbye_s=1.0,
     frames_s=PATIENCE_S,
 )
-BRIEF = DrivingPatience(acceptance_s=0.1, end_s=0.05, return_s=0.1, settling_s=0.0)
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
+BRIEF = Patience(acceptance_s=0.1, end_s=0.05, return_s=0.1, settling_s=0.0)
+LONG = Patience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
 PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 0, 1, 2, 3, 4, 5
 GOAL = Pose(4.0, 2.0)
 

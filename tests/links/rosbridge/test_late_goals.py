@@ -11,10 +11,9 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import CauseCode, GoalState
-from mapspeak.ros.actions import ActionClient, SentGoal
+from mapspeak.ros.actions import ActionClient, Patience, SentGoal
 from mapspeak.ros.messages.fields import Dialect, write_stamp
 from mapspeak.ros.robot import RosRobot
-from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import (
     ABORTED,
     CANCEL_SERVICE,
@@ -32,10 +31,10 @@ pytestmark = pytest.mark.anyio
 QUICK = Timing(
     first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, frames_s=PATIENCE_S
 )
-BRIEF = DrivingPatience(
+BRIEF = Patience(
     acceptance_s=0.2, listing_s=0.0, end_s=5.0, result_s=0.0, return_s=0.1, settling_s=0.0
 )
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=5.0, result_s=0.0, settling_s=0.0)
+LONG = Patience(acceptance_s=PATIENCE_S, end_s=5.0, result_s=0.0, settling_s=0.0)
 GOAL = Pose(4.0, 2.0)
 OURS, OTHERS, NEWER = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
 EXECUTING = 2
@@ -291,7 +290,7 @@ def goals_of(robot: RosRobot) -> list[SentGoal]:
     return client_of(robot).goals
 
 
-def client_of(robot: RosRobot) -> ActionClient[Any]:
+def client_of(robot: RosRobot) -> ActionClient:
     client = robot.connection.started.actions["/navigate_to_pose"]
     assert isinstance(client, ActionClient)
     return client
@@ -350,9 +349,7 @@ async def test_a_move_base_that_fell_silent_and_comes_back_does_not_drive_on() -
     assert stand["linear"]["x"] == stand["angular"]["z"] == 0.0
 
 
-LONG_BUT_WATCHFUL = DrivingPatience(
-    acceptance_s=PATIENCE_S, end_s=0.05, return_s=0.2, settling_s=0.0
-)
+LONG_BUT_WATCHFUL = Patience(acceptance_s=PATIENCE_S, end_s=0.05, return_s=0.2, settling_s=0.0)
 
 
 async def taken_by_move_base(scripted: ScriptedRobot, robot: RosRobot) -> str:

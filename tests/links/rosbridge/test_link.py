@@ -17,12 +17,12 @@ from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
+from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings
 from mapspeak.ros.discovery.profile import PoseSource
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.poses import write_pose
 from mapspeak.ros.robot import RosRobot
-from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from rosbridge_robot import (
@@ -42,8 +42,8 @@ pytestmark = pytest.mark.anyio
 QUICK = Timing(
     first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, frames_s=PATIENCE_S
 )
-BRIEF = DrivingPatience(acceptance_s=0.4, end_s=0.05, result_s=0.0, return_s=0.1, settling_s=0.0)
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
+BRIEF = Patience(acceptance_s=0.4, end_s=0.05, result_s=0.0, return_s=0.1, settling_s=0.0)
+LONG = Patience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
 GOAL = Pose(3.0, 4.0, 1.0)
 OURS, OTHERS = bytes(range(16)), bytes(range(16, 32))
 ROOM = """

@@ -34,11 +34,11 @@ from mapspeak.links.endpoints import (
     unknown,
 )
 from mapspeak.links.native import SEND_GOAL, NativeLink, NativeRequest
+from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import plain_errors
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
-from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
-from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
 logger = logging.getLogger(__name__)
 
@@ -375,7 +375,7 @@ async def open_dds_robot(
     network: DdsNetwork,
     *,
     overrides: RobotOverrides = NOTHING_SAID,
-    patience: DrivingPatience = USUAL_PATIENCE,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
     """Offer the ROS 2 robot in a DDS domain while the context lasts.
 

@@ -5,10 +5,10 @@ from contextlib import asynccontextmanager
 from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
+from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.port import RosConnection
-from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
-from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
 NO_VARIABLES: Mapping[str, str] = MappingProxyType({})
 HINT = (
@@ -54,7 +54,7 @@ async def open_ros2_robot(
     distro: str = "",
     variables: Mapping[str, str] = NO_VARIABLES,
     overrides: RobotOverrides = NOTHING_SAID,
-    patience: DrivingPatience = USUAL_PATIENCE,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
     """Offer the robot in a ROS 2 domain while the context lasts.
 

@@ -23,13 +23,13 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     write_operation,
 )
 from mapspeak.links.rosbridge.rosapi import Rosapi
+from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.activity import ActionEnd, ActionGoal
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import NOTICE_S, plain_errors
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import LinkName, OwnEnds, new_id
-from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
-from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
 logger = logging.getLogger(__name__)
 
@@ -352,7 +352,7 @@ async def open_rosbridge_robot(
     *,
     overrides: RobotOverrides = NOTHING_SAID,
     timing: Timing = USUAL_TIMING,
-    patience: DrivingPatience = USUAL_PATIENCE,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
     """Offer the robot behind a rosbridge server while the context lasts.
 

@@ -4,14 +4,15 @@ import logging
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Generic, TypeVar
 
 import anyio
 
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.ros.actions.goal import ActionState, SentGoal
+from mapspeak.ros.activity import Subscription
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import RosConnection
 
@@ -34,17 +35,16 @@ LONGEST_LOOK_S = 2.0
 
 logger = logging.getLogger(__name__)
 
-Goal = TypeVar("Goal", bound=SentGoal)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ActionPatience:
-    """How long to wait for an action server, in wall time; a test shortens it.
+class Patience:
+    """How long to wait for what a robot offers, in wall time; a test shortens it.
 
     Between nodes on Fast DDS, a message that was lost comes again after three seconds: to wait for
     less would be to take a lost message for a silent robot.
 
     Attributes:
+        settling_s: After connecting, without anything new, until all that is there is found.
         acceptance_s: For the first sign that a goal was taken.
         listing_s: For the list of the goals there are, before our own first one.
         end_s: For a goal to end that was cancelled or replaced.
@@ -52,6 +52,7 @@ class ActionPatience:
         return_s: After a reconnection, for word of a goal that was under way.
     """
 
+    settling_s: float = 5.0
     acceptance_s: float = 5.0
     listing_s: float = 0.3
     end_s: float = 4.0
@@ -59,7 +60,10 @@ class ActionPatience:
     return_s: float = 5.0
 
 
-class ActionClient(ABC, Generic[Goal]):
+USUAL_PATIENCE = Patience()
+
+
+class ActionClient(ABC):
     """Sends goals to one action, and knows each of them until the action server has ended it.
 
     A goal that we said to be over is *withdrawn*: one that was not taken in time, that was ended
@@ -77,7 +81,8 @@ class ActionClient(ABC, Generic[Goal]):
         action: str,
         *,
         type_name: str,
-        patience: ActionPatience,
+        patience: Patience,
+        statuses: Subscription,
     ) -> None:
         self.action = action
         self.type_name = type_name
@@ -85,7 +90,8 @@ class ActionClient(ABC, Generic[Goal]):
         self.listeners: list[Callable[[], None]] = []
         self._connection = connection
         self._patience = patience
-        self._goals: dict[str, Goal] = {}
+        self._list = statuses
+        self._goals: dict[str, SentGoal] = {}
         self._being_ended: set[str] = set()
         self._statuses: dict[str, ActionState] = {}
         self._feedback_within_s = math.inf
@@ -105,12 +111,12 @@ class ActionClient(ABC, Generic[Goal]):
         return frozenset(goal.owner for goal in self.open_goals if goal.owner is not None)
 
     @property
-    def goals(self) -> list[Goal]:
+    def goals(self) -> list[SentGoal]:
         """Our goals, in the order in which they were sent; of those that are over, the latest."""
         return list(self._goals.values())
 
     @property
-    def open_goals(self) -> list[Goal]:
+    def open_goals(self) -> list[SentGoal]:
         """Our goals that are not over, in the order in which they were sent."""
         return [goal for goal in self.goals if not goal.is_over]
 
@@ -120,7 +126,7 @@ class ActionClient(ABC, Generic[Goal]):
         return self._statuses
 
     @property
-    def ours(self) -> Mapping[str, Goal]:
+    def ours(self) -> Mapping[str, SentGoal]:
         """Our own goals by the server's ids, as far as these are known."""
         return {goal.server_id: goal for goal in self._goals.values() if goal.server_id}
 
@@ -135,13 +141,16 @@ class ActionClient(ABC, Generic[Goal]):
         }
 
     @property
-    @abstractmethod
     def listed_s(self) -> float:
         """When the list of the goals came, by the event loop's clock."""
+        return self._list.arrived_s
 
-    @abstractmethod
     async def wait_for_list(self) -> None:
-        """Wait a moment for the goals there are, so that none is taken for ours."""
+        """Wait a moment for the goals there are; a server without goals need not have said so."""
+        left_s = self._list.begun_s + self._patience.listing_s - anyio.current_time()
+        if self._list.n_received == 0 and left_s > 0.0:
+            with suppress(LinkError):
+                await self._list.wait_for_more_than(0, timeout_s=left_s)
 
     def look(self) -> None:
         """Take in that time has passed: that nothing was heard for long says something too."""
@@ -179,7 +188,7 @@ class ActionClient(ABC, Generic[Goal]):
         through: RosConnection,
         owner: str | None = None,
         n_stops: int | None = None,
-    ) -> Goal:
+    ) -> SentGoal:
         """Send a goal; `wait_until_taken` has to follow.
 
         Args:
@@ -206,19 +215,24 @@ class ActionClient(ABC, Generic[Goal]):
             self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
         return goal
 
-    async def wait_until_taken(self, goal: Goal) -> None:
+    async def wait_until_taken(self, goal: SentGoal) -> None:
         """Return when the server has taken or refused a goal; withdraw one that it does not."""
         try:
-            is_taken = await goal.wait_until_taken(within_s=self._patience.acceptance_s)
+            is_taken = await goal.wait_until(
+                lambda: goal.state is not ActionState.SENT, within_s=self._patience.acceptance_s
+            )
         except anyio.get_cancelled_exc_class():
             # Only its sender knows of this goal: without him it would drive on.
-            await self._give_up(goal)
+            if goal.state is ActionState.SENT:
+                self._withdraw(goal, ActionState.CANCELLED, GIVEN_UP)
+            elif not goal.is_over:
+                self._ask_to_cancel(goal)
             raise
         if not is_taken:
             reason = NOT_TAKEN.format(self._patience.acceptance_s)
             self._withdraw(goal, ActionState.REJECTED, reason)
 
-    async def cancel(self, goal: Goal) -> None:
+    async def cancel(self, goal: SentGoal) -> None:
         """End one goal, and wait a moment for its end.
 
         Raises:
@@ -268,37 +282,30 @@ class ActionClient(ABC, Generic[Goal]):
         return True
 
     @abstractmethod
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> Goal:
+    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
         """Send a goal."""
 
     @abstractmethod
-    def _ask_to_cancel(self, goal: Goal) -> None:
+    def _ask_to_cancel(self, goal: SentGoal) -> None:
         """Ask at once for the end of a goal, whatever comes of it."""
 
     @abstractmethod
-    async def _cancel(self, goal: Goal) -> bool:
+    async def _cancel(self, goal: SentGoal) -> bool:
         """Ask for the end of a goal; return True when the server says that it has ended."""
 
     @abstractmethod
-    def _look_at(self, goal: Goal) -> None:
+    def _look_at(self, goal: SentGoal) -> None:
         """Take in that time has passed for a goal."""
 
     # --- inside: withdrawing, once for all
 
-    def _withdraw(self, goal: Goal, state: ActionState, reason: str) -> None:
+    def _withdraw(self, goal: SentGoal, state: ActionState, reason: str) -> None:
         """Say that a goal is over, and see to it that the server sees it so."""
         goal.withdraw(state, reason=reason)
         self._ask_to_cancel(goal)
         self._tell()
 
-    async def _give_up(self, goal: Goal) -> None:
-        """End a goal whose sender has gone."""
-        if goal.state is ActionState.SENT:
-            self._withdraw(goal, ActionState.CANCELLED, GIVEN_UP)
-        elif not goal.is_over:
-            self._ask_to_cancel(goal)
-
-    def _note_life(self, goal: Goal) -> None:
+    def _note_life(self, goal: SentGoal) -> None:
         """Take in that the server has a goal; one that was withdrawn is cancelled at once."""
         if goal.is_withdrawn and not goal.is_settled and goal.id not in self._being_ended:
             self._being_ended.add(goal.id)
@@ -307,12 +314,12 @@ class ActionClient(ABC, Generic[Goal]):
             logger.warning("A goal of %s that was withdrawn: %s", self.action, goal.afterwards)
             self._connection.start_soon(partial(self._end_for_certain, goal))
 
-    def _note_server_end(self, goal: Goal) -> None:
+    def _note_server_end(self, goal: SentGoal) -> None:
         """Take in that the server has ended a goal that was withdrawn."""
         if goal.is_withdrawn and not goal.is_settled:
             goal.settle()
 
-    async def _end_for_certain(self, goal: Goal) -> None:
+    async def _end_for_certain(self, goal: SentGoal) -> None:
         """Cancel a goal until the server has ended it."""
         for pause_s in PAUSES_S:
             try:
@@ -320,11 +327,11 @@ class ActionClient(ABC, Generic[Goal]):
                     goal.settle()
             except LinkError as error:
                 logger.warning("A late goal of %s is not cancelled yet: %s", self.action, error)
-            if await goal.wait_until_settled(within_s=pause_s):
+            if await goal.wait_until(lambda: goal.is_settled, within_s=pause_s):
                 break
         self._being_ended.discard(goal.id)
 
-    async def _cancel_each(self, goals: Iterable[Goal]) -> None:
+    async def _cancel_each(self, goals: Iterable[SentGoal]) -> None:
         """Ask for the end of all goals; raise `LinkError` when one of them was refused."""
         faults: list[LinkError] = []
         for goal in goals:
@@ -335,7 +342,7 @@ class ActionClient(ABC, Generic[Goal]):
         if faults:
             raise faults[0]
 
-    async def _check_ended(self, goals: Iterable[Goal]) -> None:
+    async def _check_ended(self, goals: Iterable[SentGoal]) -> None:
         with anyio.move_on_after(self._patience.end_s):
             for goal in goals:
                 await goal.wait_until_over(within_s=self._patience.end_s)

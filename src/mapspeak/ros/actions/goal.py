@@ -1,12 +1,11 @@
-"""One goal of an action, from its sending to its end and beyond, and the states servers tell."""
+"""One goal of an action, from its sending to its end and beyond, and how it may stand."""
 
-import base64
-import binascii
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from enum import StrEnum
 
 import anyio
 
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import RosConnection
 
@@ -48,8 +47,9 @@ class SentGoal:
     """A goal of ours. Once over its state stays, and only its result may still come.
 
     Attributes:
-        id: Ours, used nowhere else.
+        wire: What the connection tells of it; on ROS 1, where topics do, only its ids.
         through: The connection it was sent over, which may be guarded.
+        n_seen: How many goals the server had listed before.
         owner: The client with whom it ends; None where somebody else sees to that.
         server_id: What the action server calls it; None where that is unknown.
         silent_s: Robot time since the latest, as far as somebody looked.
@@ -58,26 +58,31 @@ class SentGoal:
         is_withdrawn: We said that it was over before the server did: should the server take it,
             or still have it, it is cancelled.
         is_settled: The server has ended a withdrawn goal, or never had it.
-        sent_s: When it was sent, by the event loop's clock.
+        sent_s: When it was sent, by the event loop's clock, as are the others.
+        heard_s: When the connection last told of it.
         listed_end_s: When the list of all goals first told its end; None before.
+        taken_feedback: Of what the connection has told, the latest that was taken in.
+        n_lists_at_loss: How many lists had come when the connection lost it; None before.
+        n_lists_at_end: How many had come when it was withdrawn.
     """
 
     def __init__(
         self,
-        goal_id: str,
+        wire: ActionGoal,
         *,
-        action: str,
         type_name: str,
         through: RosConnection,
         sent_s: float,
-        server_id: str | None = None,
+        n_seen: int = 0,
     ) -> None:
-        self.id = goal_id
-        self.action = action
+        self.wire = wire
+        self.id = wire.goal_id
+        self.action = wire.action
         self.type = type_name
         self.through = through
+        self.n_seen = n_seen
         self.owner: str | None = None
-        self.server_id = server_id
+        self.server_id = wire.ros_id
         self.state = ActionState.SENT
         self.feedback: Message | None = None
         self.n_feedback = 0
@@ -88,8 +93,12 @@ class SentGoal:
         self.is_withdrawn = False
         self.is_settled = False
         self.sent_s = sent_s
+        self.heard_s = anyio.current_time()
         self.ended_s: float | None = None
         self.listed_end_s: float | None = None
+        self.taken_feedback: Message | None = None
+        self.n_lists_at_loss: int | None = None
+        self.n_lists_at_end = 0
         self._news = anyio.Event()
 
     @property
@@ -135,44 +144,13 @@ class SentGoal:
         news, self._news = self._news, anyio.Event()
         news.set()
 
-    async def wait_until_taken(self, *, within_s: float) -> bool:
-        """Return at the first sign that the goal was taken, or after so long; True with a sign."""
-        return await self._wait_until(lambda: self.state is not ActionState.SENT, within_s)
-
     async def wait_until_over(self, *, within_s: float) -> bool:
         """Return at its end, or after so long; True at its end."""
-        return await self._wait_until(lambda: self.is_over, within_s)
+        return await self.wait_until(lambda: self.is_over, within_s=within_s)
 
-    async def wait_until_settled(self, *, within_s: float) -> bool:
-        """Return when the server has ended a withdrawn goal, or after so long; True when it has."""
-        return await self._wait_until(lambda: self.is_settled, within_s)
-
-    async def _wait_until(self, is_so: Callable[[], bool], within_s: float) -> bool:
+    async def wait_until(self, is_so: Callable[[], bool], *, within_s: float) -> bool:
+        """Return when something has come true of it, or after so long; True when it has."""
         with anyio.move_on_after(within_s):
             while not is_so():
                 await self._news.wait()
         return is_so()
-
-
-STATES = {
-    1: ActionState.ACCEPTED,
-    2: ActionState.RUNNING,
-    3: ActionState.CANCELLING,
-    4: ActionState.SUCCEEDED,
-    5: ActionState.CANCELLED,
-    6: ActionState.ABORTED,
-}
-"""action_msgs/GoalStatus."""
-
-
-def read_statuses(message: Message) -> Iterator[tuple[str, ActionState]]:
-    """Yield id and state of each goal of a list; leave out what is none."""
-    entries = message.get("status_list")
-    for entry in entries if isinstance(entries, list) else []:
-        try:
-            # The 16 bytes of an id come as a list, as base64 or as bytes.
-            uuid = entry["goal_info"]["goal_id"]["uuid"]
-            raw = base64.b64decode(uuid, validate=True) if isinstance(uuid, str) else bytes(uuid)
-            yield raw.hex(), STATES[entry["status"]]
-        except (KeyError, TypeError, ValueError, binascii.Error):
-            continue

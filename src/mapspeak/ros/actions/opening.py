@@ -1,14 +1,10 @@
 """The client of an action: one for each connection and action, whoever uses it."""
 
-from typing import Any
-
-from mapspeak.ros.actions.client import ActionClient, ActionPatience
+from mapspeak.ros.actions.client import USUAL_PATIENCE, ActionClient, Patience
 from mapspeak.ros.actions.ros1 import Ros1ActionClient
 from mapspeak.ros.actions.ros2 import Ros2ActionClient
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosConnection
-
-USUAL_PATIENCE = ActionPatience()
 
 
 def open_action(
@@ -17,8 +13,8 @@ def open_action(
     *,
     dialect: Dialect,
     type_name: str,
-    patience: ActionPatience = USUAL_PATIENCE,
-) -> ActionClient[Any]:
+    patience: Patience = USUAL_PATIENCE,
+) -> ActionClient:
     """Return the client of an action; the first who asks for it decides how patient it is."""
     known = connection.started.actions.get(action)
     if isinstance(known, ActionClient):

@@ -5,15 +5,9 @@ from collections.abc import Iterator, Mapping
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.actions.client import (
-    GONE,
-    RESULT_LATE,
-    SILENT,
-    ActionClient,
-    ActionPatience,
-)
+from mapspeak.ros.actions.client import GONE, RESULT_LATE, SILENT, ActionClient, Patience
 from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.activity import Listener, Subscription
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.messages.fields import Dialect, Message, write_header, write_stamp
 from mapspeak.ros.port import RosConnection, has_listeners, new_id
 
@@ -34,29 +28,26 @@ STATES = {
 NOW = write_stamp(0.0, dialect=Dialect.ROS1)
 
 
-class Ros1ActionClient(ActionClient[SentGoal]):
+class Ros1ActionClient(ActionClient):
     """Sends goals under ids of ours, by which actionlib's list of goals tells them for certain."""
 
     def __init__(
-        self, connection: RosConnection, action: str, *, type_name: str, patience: ActionPatience
+        self, connection: RosConnection, action: str, *, type_name: str, patience: Patience
     ) -> None:
-        super().__init__(connection, action, type_name=type_name, patience=patience)
-        self._list = self._listen("status", STATUS_TYPE, self._take_list)
-        self._listen("result", f"{type_name}ActionResult", self._take_result)
-        self._listen("feedback", f"{type_name}ActionFeedback", self._take_feedback)
-
-    @property
-    def listed_s(self) -> float:
-        """When the list of the goals came, by the event loop's clock."""
-        return self._list.arrived_s
-
-    async def wait_for_list(self) -> None:
-        """Wait a moment for the goals there are; ours need none, they have ids of their own."""
-        if self._list.n_received == 0:
-            try:
-                await self._list.wait_for_more_than(0, timeout_s=self._patience.listing_s)
-            except LinkError:
-                return
+        statuses, results, feedback = (
+            connection.subscribe(f"{action}/{topic}", type_name=topic_type)
+            for topic, topic_type in (
+                ("status", STATUS_TYPE),
+                ("result", f"{type_name}ActionResult"),
+                ("feedback", f"{type_name}ActionFeedback"),
+            )
+        )
+        super().__init__(
+            connection, action, type_name=type_name, patience=patience, statuses=statuses
+        )
+        statuses.listen(self._take_list)
+        results.listen(self._take_result)
+        feedback.listen(self._take_feedback)
 
     def advertise(self, through: RosConnection) -> dict[str, str]:
         """Say that we will publish goals and cancellations; return the types by topic."""
@@ -78,14 +69,8 @@ class Ros1ActionClient(ActionClient[SentGoal]):
 
     async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
         goal_id = new_id()
-        goal = SentGoal(
-            goal_id,
-            action=self.action,
-            type_name=self.type_name,
-            through=through,
-            sent_s=sent_s,
-            server_id=goal_id,
-        )
+        wire = ActionGoal(goal_id=goal_id, action=self.action, ros_id=goal_id)
+        goal = SentGoal(wire, type_name=self.type_name, through=through, sent_s=sent_s)
         # Known before it is sent: the answer may come while it is still being sent.
         self._goals[goal_id] = goal
         message = {
@@ -130,11 +115,6 @@ class Ros1ActionClient(ActionClient[SentGoal]):
             self._withdraw(goal, ActionState.LOST, SILENT.format(silent_s))
 
     # --- what the topics say
-
-    def _listen(self, topic: str, type_name: str, take: Listener) -> Subscription:
-        subscription = self._connection.subscribe(f"{self.action}/{topic}", type_name=type_name)
-        subscription.listen(take)
-        return subscription
 
     def _take_list(self, message: Message) -> None:
         self._statuses = {}

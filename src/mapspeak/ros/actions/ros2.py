@@ -1,20 +1,15 @@
 """Actions of ROS 2: goals over the connection, and the latched list of all goals' states."""
 
-from collections.abc import Mapping
+import base64
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.actions.client import (
-    GONE,
-    RESULT_LATE,
-    UNSERVED,
-    ActionClient,
-    ActionPatience,
-)
-from mapspeak.ros.actions.goal import STATES, ActionState, SentGoal, read_statuses
-from mapspeak.ros.activity import ActionEnd, ActionGoal
+from mapspeak.ros.actions.client import GONE, RESULT_LATE, UNSERVED, ActionClient, Patience
+from mapspeak.ros.actions.goal import ActionState, SentGoal
+from mapspeak.ros.activity import ActionEnd
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import RosConnection
 
@@ -22,6 +17,15 @@ CANCEL_TYPE, STATUS_TYPE = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalSt
 REFUSED = 1
 ENDED = (2, 3)
 """action_msgs/CancelGoal: the server knows no such goal, or has ended it."""
+STATES = {
+    1: ActionState.ACCEPTED,
+    2: ActionState.RUNNING,
+    3: ActionState.CANCELLING,
+    4: ActionState.SUCCEEDED,
+    5: ActionState.CANCELLED,
+    6: ActionState.ABORTED,
+}
+"""action_msgs/GoalStatus."""
 RESULT_GONE = "Its result went with the connection."
 UNSAID = "The action server ended the goal without saying how."
 SUSPECTED_S = (0.05, 0.05, 0.1, 0.1, 0.2, 0.5, 1.0, 1.0)
@@ -33,35 +37,7 @@ RECENT_S = 60.0
 N_SEEN_KEPT = 1_000
 
 
-class Ros2Goal(SentGoal):
-    """A goal of ours, with what the connection tells of it and what of that was taken in."""
-
-    def __init__(
-        self,
-        wire: ActionGoal,
-        *,
-        type_name: str,
-        through: RosConnection,
-        sent_s: float,
-        n_seen: int,
-    ) -> None:
-        super().__init__(
-            wire.goal_id,
-            action=wire.action,
-            type_name=type_name,
-            through=through,
-            sent_s=sent_s,
-            server_id=wire.ros_id,
-        )
-        self.wire = wire
-        self.n_seen = n_seen
-        self.taken_feedback: Message | None = None
-        self.n_lists_at_loss: int | None = None
-        self.n_lists_at_end = 0
-        self.heard_s = anyio.current_time()
-
-
-class Ros2ActionClient(ActionClient[Ros2Goal]):
+class Ros2ActionClient(ActionClient):
     """Sends goals, and joins what is heard of them: from the connection, and from the list.
 
     In ROS 2 itself the server knows a goal by the id that we gave it. rosbridge gives it another,
@@ -75,21 +51,18 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
     """
 
     def __init__(
-        self, connection: RosConnection, action: str, *, type_name: str, patience: ActionPatience
+        self, connection: RosConnection, action: str, *, type_name: str, patience: Patience
     ) -> None:
-        super().__init__(connection, action, type_name=type_name, patience=patience)
+        statuses = connection.subscribe(f"{action}/_action/status", type_name=STATUS_TYPE)
+        super().__init__(
+            connection, action, type_name=type_name, patience=patience, statuses=statuses
+        )
         self._seen: dict[str, int] = {}
         self._n_seen = 0
         self._suspected: set[str] = set()
-        self._lists = connection.subscribe(f"{action}/_action/status", type_name=STATUS_TYPE)
-        self._lists.listen(self._take_list)
-        if self._lists.latest is not None:
-            self._take_list(self._lists.latest)
-
-    @property
-    def listed_s(self) -> float:
-        """When the list of the goals came, by the event loop's clock."""
-        return self._lists.arrived_s
+        statuses.listen(self._take_list)
+        if statuses.latest is not None:
+            self._take_list(statuses.latest)
 
     @property
     def others(self) -> Mapping[str, ActionState]:
@@ -98,16 +71,6 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             return {}
         return super().others
 
-    async def wait_for_list(self) -> None:
-        """Wait a moment for the goals there are; a server without goals need not have said so."""
-        age_s = anyio.current_time() - self._lists.begun_s
-        if self._lists.n_received == 0 and age_s < self._patience.listing_s:
-            try:
-                left_s = self._patience.listing_s - age_s
-                await self._lists.wait_for_more_than(0, timeout_s=left_s)
-            except LinkError:
-                return
-
     async def cancel_all(self, through: RosConnection | None = None) -> int:
         """Cancel every goal of the action, whoever sent it; return how many there were."""
         connection = through or self._connection
@@ -115,10 +78,10 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
         answer = await self._call_cancel(connection, {})
         return len(answer.get("goals_canceling") or [])
 
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> Ros2Goal:
+    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
         n_seen = self._n_seen
         wire = await through.send_goal(self.action, arguments, type_name=self.type_name)
-        goal = Ros2Goal(
+        goal = SentGoal(
             wire, type_name=self.type_name, through=through, sent_s=sent_s, n_seen=n_seen
         )
         self._goals[goal.id] = goal
@@ -128,16 +91,16 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
         self._hear(goal)
         return goal
 
-    def _ask_to_cancel(self, goal: Ros2Goal) -> None:
+    def _ask_to_cancel(self, goal: SentGoal) -> None:
         goal.through.cancel_goal(goal.wire)
         if goal.is_withdrawn:
-            goal.n_lists_at_end = self._lists.n_received
+            goal.n_lists_at_end = self._list.n_received
             goal.through.give_up_goal(goal.wire)
             if goal.server_id is None:
                 # It may be one of those that could not be told apart until now.
                 self._claim(self._seen_since(goal))
 
-    async def _cancel(self, goal: Ros2Goal) -> bool:
+    async def _cancel(self, goal: SentGoal) -> bool:
         wire = goal.wire
         if wire.ros_id is None:
             goal.through.cancel_goal(wire)
@@ -177,13 +140,13 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
 
     # --- what is heard
 
-    def _hear(self, goal: Ros2Goal) -> None:
+    def _hear(self, goal: SentGoal) -> None:
         """Take in what the connection tells of a goal."""
         goal.heard_s = anyio.current_time()
         self._consider(goal)
         self._tell()
 
-    def _look_at(self, goal: Ros2Goal) -> None:
+    def _look_at(self, goal: SentGoal) -> None:
         self._consider(goal)
         if goal.wire.is_lost:
             # What brought its feedback is gone; the list goes on.
@@ -194,7 +157,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             goal.heard_s = anyio.current_time()
             self._connection.start_soon(partial(self._check_served, goal))
 
-    async def _check_served(self, goal: Ros2Goal) -> None:
+    async def _check_served(self, goal: SentGoal) -> None:
         """Withdraw a goal whose server is no more: over rosbridge nobody else would tell."""
         try:
             servers = await self._connection.fetch_publishers(f"{self.action}/_action/status")
@@ -204,7 +167,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             self._withdraw(goal, ActionState.LOST, UNSERVED)
 
     def _take_list(self, message: Message) -> None:
-        self._statuses = dict(read_statuses(message))
+        self._statuses = dict(_read_statuses(message))
         fresh = [each for each in self._statuses if each not in self._seen]
         for server_id in fresh:
             self._seen[server_id] = self._n_seen
@@ -219,7 +182,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             self._consider(goal)
         self._tell()
 
-    def _consider(self, goal: Ros2Goal) -> None:
+    def _consider(self, goal: SentGoal) -> None:
         """Draw from all that has been heard how a goal stands."""
         wire = goal.wire
         status = self._statuses.get(goal.server_id or "")
@@ -241,19 +204,19 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
         if wire.is_lost and not goal.is_over:
             self._consider_loss(goal, is_listed=status is not None)
 
-    def _consider_withdrawn(self, goal: Ros2Goal, status: ActionState | None) -> None:
+    def _consider_withdrawn(self, goal: SentGoal, status: ActionState | None) -> None:
         wire = goal.wire
         is_server_gone = wire.is_lost and wire.ros_id is not None
         if wire.end is not None or is_server_gone or (status is not None and status.is_final):
             self._note_server_end(goal)
             return
-        is_listed = status is not None and self._lists.n_received > goal.n_lists_at_end
+        is_listed = status is not None and self._list.n_received > goal.n_lists_at_end
         # That a lost goal was taken once is no sign of life.
         is_taken = wire.is_accepted and goal.state is not ActionState.LOST
         if is_taken or is_listed or wire.feedback is not goal.taken_feedback:
             self._note_life(goal)
 
-    def _end_by_result(self, goal: Ros2Goal, end: ActionEnd) -> None:
+    def _end_by_result(self, goal: SentGoal, end: ActionEnd) -> None:
         values = end.values if isinstance(end.values, Mapping) else None
         if not end.is_result:
             said = end.values if isinstance(end.values, str) else ""
@@ -266,7 +229,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
         else:
             goal.end(state, reason=_reason_of(values, state), result=values)
 
-    def _end_by_list(self, goal: Ros2Goal, state: ActionState) -> None:
+    def _end_by_list(self, goal: SentGoal, state: ActionState) -> None:
         now_s = anyio.current_time()
         goal.listed_end_s = goal.listed_end_s or now_s
         goal.move_on(ActionState.ACCEPTED)
@@ -276,8 +239,8 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
         elif now_s - goal.listed_end_s > self._patience.result_s:
             goal.end(state, reason=RESULT_LATE)
 
-    def _consider_loss(self, goal: Ros2Goal, *, is_listed: bool) -> None:
-        n_lists = self._lists.n_received
+    def _consider_loss(self, goal: SentGoal, *, is_listed: bool) -> None:
+        n_lists = self._list.n_received
         if goal.n_lists_at_loss is None:
             goal.n_lists_at_loss = n_lists
         has_news = n_lists > goal.n_lists_at_loss
@@ -289,7 +252,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
 
     # --- which goal is ours, where only rosbridge knows
 
-    def _seen_since(self, goal: Ros2Goal) -> list[str]:
+    def _seen_since(self, goal: SentGoal) -> list[str]:
         """Return the listed goals that go on, and were first seen after a goal was sent."""
         return [
             server_id
@@ -311,11 +274,11 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             else:
                 self._give_to_open(server_id)
 
-    def _unresolved(self) -> list[Ros2Goal]:
+    def _unresolved(self) -> list[SentGoal]:
         """Return the withdrawn goals that the server may still take under an unknown id."""
         return [goal for goal in self._suspects() if goal.is_withdrawn and not goal.is_settled]
 
-    def _suspects(self) -> list[Ros2Goal]:
+    def _suspects(self) -> list[SentGoal]:
         """Return our goals that are over, and that the list may still name for the first time."""
         return [
             goal
@@ -325,7 +288,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             and (self._is_recent(goal) or (goal.is_withdrawn and not goal.is_settled))
         ]
 
-    def _is_recent(self, goal: Ros2Goal) -> bool:
+    def _is_recent(self, goal: SentGoal) -> bool:
         heard_s = max(goal.ended_s or 0.0, goal.heard_s)
         return anyio.current_time() - heard_s < RECENT_S
 
@@ -346,7 +309,7 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
                 self._resolve(goal, server_id)
                 return
 
-    def _resolve(self, goal: Ros2Goal, server_id: str) -> None:
+    def _resolve(self, goal: SentGoal, server_id: str) -> None:
         """Give an id to a goal that is over; what it may have been is then known to be another."""
         goal.server_id = server_id
         self._note_life(goal)
@@ -386,6 +349,19 @@ class Ros2ActionClient(ActionClient[Ros2Goal]):
             (goal.state is ActionState.CANCELLED or goal.wire.is_lost) and self._is_recent(goal)
             for goal in self._unresolved()
         )
+
+
+def _read_statuses(message: Message) -> Iterator[tuple[str, ActionState]]:
+    """Yield id and state of each goal of a list; leave out what is none."""
+    entries = message.get("status_list")
+    for entry in entries if isinstance(entries, list) else []:
+        try:
+            # The 16 bytes of an id come as a list, as base64 or as bytes.
+            uuid = entry["goal_info"]["goal_id"]["uuid"]
+            raw = base64.b64decode(uuid, validate=True) if isinstance(uuid, str) else bytes(uuid)
+            yield raw.hex(), STATES[entry["status"]]
+        except (KeyError, TypeError, ValueError):
+            continue
 
 
 def _reason_of(values: Message | None, state: ActionState) -> str:

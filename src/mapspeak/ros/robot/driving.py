@@ -3,14 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
-from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal, open_action
+from mapspeak.ros.actions import ActionState, Patience, SentGoal, open_action
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.ros.port import RosConnection
@@ -69,45 +68,6 @@ LATEST_S = 0.0
 """A stamp that ROS takes for "as it is now"; our idea of robot time may be off."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrivingPatience(ActionPatience):
-    """How long to wait for the robot's navigation, in wall time; a test shortens it.
-
-    Attributes:
-        settling_s: After connecting, without anything new, until all that is there is found.
-    """
-
-    settling_s: float = 5.0
-
-
-class GoalDriver(Protocol):
-    """One way of sending goals."""
-
-    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Return how goals stand that others have sent and that are under way."""
-        ...
-
-    async def send(self, goal: Pose) -> GoalRecord:
-        """Send a goal in the map frame; return the record of what becomes of it.
-
-        Raises:
-            LinkError: It could not be sent.
-        """
-        ...
-
-    async def look_at(self, record: GoalRecord) -> None:
-        """Bring a record up to date."""
-        ...
-
-    async def cancel(self, record: GoalRecord) -> None:
-        """End one goal, and wait a moment for the end.
-
-        Raises:
-            LinkError: It goes on, or navigation could not be told.
-        """
-        ...
-
-
 STATE_OF = {
     ActionState.SUCCEEDED: GoalState.ARRIVED,
     ActionState.ABORTED: GoalState.BLOCKED,
@@ -152,7 +112,7 @@ class ActionDriver:
         navigation: Navigation,
         *,
         map_frame: str,
-        patience: DrivingPatience,
+        patience: Patience,
         now_s: Callable[[], float],
         on_lost: Callable[[], None] = lambda: None,
     ) -> None:

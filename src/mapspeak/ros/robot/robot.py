@@ -16,6 +16,7 @@ from mapspeak.robot import (
     RobotDescription,
     StampedPose,
 )
+from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.parts import (
     CAMERA,
@@ -30,14 +31,7 @@ from mapspeak.ros.discovery.parts import (
 from mapspeak.ros.discovery.profile import NavigationKind, RobotProfile
 from mapspeak.ros.discovery.watch import FRAMES_S, RobotWatch
 from mapspeak.ros.port import RosConnection
-from mapspeak.ros.robot.driving import (
-    MOVE_BASE,
-    NAV2,
-    ActionDriver,
-    DrivingPatience,
-    GoalDriver,
-    GoalRecord,
-)
+from mapspeak.ros.robot.driving import MOVE_BASE, NAV2, ActionDriver, GoalRecord
 from mapspeak.ros.robot.goaltopic import GoalTopicDriver
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
@@ -47,7 +41,6 @@ from mapspeak.ros.transforms import FrameListener
 from mapspeak.spatial import OccupancyGrid
 
 MOST_GOALS_KEPT = 1_000
-USUAL_PATIENCE = DrivingPatience()
 NOTHING_SAID = RobotOverrides()
 
 
@@ -61,7 +54,7 @@ class RosRobot:
         *,
         frames: FrameListener,
         clock: RobotClock,
-        patience: DrivingPatience = USUAL_PATIENCE,
+        patience: Patience = USUAL_PATIENCE,
     ) -> None:
         self.connection = connection
         self._watch = watch
@@ -262,7 +255,7 @@ class RosRobot:
         """Stop the base itself: whoever drove it has gone, and some keep to the last velocity."""
         self._brake.pull()
 
-    def _build_driver(self) -> GoalDriver | None:
+    def _build_driver(self) -> ActionDriver | GoalTopicDriver | None:
         profile, name = self.profile, self.profile.navigation_name
         if name is None:
             return None
@@ -289,7 +282,7 @@ class RosRobot:
             case NavigationKind.NONE:
                 return None
 
-    def _wanted_driver(self) -> GoalDriver:
+    def _wanted_driver(self) -> ActionDriver | GoalTopicDriver:
         if self._driver is None:
             raise LinkError(
                 "The robot offers no navigation.",
@@ -312,7 +305,7 @@ async def build_ros_robot(
     connection: RosConnection,
     *,
     overrides: RobotOverrides = NOTHING_SAID,
-    patience: DrivingPatience = USUAL_PATIENCE,
+    patience: Patience = USUAL_PATIENCE,
     frames_s: float = FRAMES_S,
 ) -> RosRobot:
     """Return the robot at the other end of a connection, once it has said what it offers.

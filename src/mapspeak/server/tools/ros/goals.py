@@ -2,15 +2,15 @@
 
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import Any
 
 import anyio
 
 from mapspeak.errors import GoalError
 from mapspeak.ros.actions import (
+    USUAL_PATIENCE,
     ActionClient,
-    ActionPatience,
     ActionState,
+    Patience,
     SentGoal,
     open_action,
 )
@@ -21,7 +21,6 @@ from mapspeak.server.tools.ros.inquiry import RosInquiry
 
 MOST_KEPT = 200
 POLL_S = 0.2
-USUAL_PATIENCE = ActionPatience()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +35,7 @@ class TrackedGoal:
 
     handle: str
     goal: SentGoal
-    action: ActionClient[Any]
+    action: ActionClient
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +67,7 @@ class ActionBook:
         inquiry: RosInquiry,
         commands: RosCommands,
         *,
-        patience: ActionPatience = USUAL_PATIENCE,
+        patience: Patience = USUAL_PATIENCE,
     ) -> None:
         self._inquiry = inquiry
         self._commands = commands
@@ -176,7 +175,7 @@ class ActionBook:
         """Return when an action server's list of goals came, by the event loop's clock."""
         return (await self._find_client(action)).listed_s
 
-    async def _find_client(self, action: str) -> ActionClient[Any]:
+    async def _find_client(self, action: str) -> ActionClient:
         known = self._inquiry.connection.started.actions.get(action)
         if isinstance(known, ActionClient):
             return known
@@ -186,7 +185,7 @@ class ActionBook:
         type_name = "" if is_ros2 else await self._inquiry.fetch_action_type(action)
         return await self._open(action, type_name)
 
-    async def _open(self, action: str, type_name: str) -> ActionClient[Any]:
+    async def _open(self, action: str, type_name: str) -> ActionClient:
         return open_action(
             self._inquiry.connection,
             action,
