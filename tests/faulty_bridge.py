@@ -2,10 +2,9 @@
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
-from typing import Any
 
 import anyio
-from anyio.abc import Listener, SocketAttribute, TaskGroup
+from anyio.abc import TaskGroup
 
 from fakes import two_rooms
 from faulty import Faults, FaultyRobot, Velocity
@@ -15,7 +14,7 @@ from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import Twist, read_twist, write_twist
 from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.hub import Hub, Publication, Topic
-from mapspeak.rosbridge_server.serving import Reception
+from mapspeak.rosbridge_server.serving import listen
 from mapspeak.rosbridge_server.stack import NAVIGATORS, SLAM_NODES, RosStack, topics_of
 from mapspeak.spatial import OccupancyGrid
 
@@ -198,14 +197,10 @@ class FaultyBridge:
         self._has_ended = anyio.Event()
         try:
             with anyio.CancelScope() as self._running:
-                listener: Listener[Any] = await anyio.create_tcp_listener(
-                    local_host="127.0.0.1", local_port=self.port
-                )
-                self.port = listener.extra(SocketAttribute.local_port)  # noqa: S610 - no SQL
-                reception = Reception(self.ros, goals_in_new_thread=False)
-                async with listener, anyio.create_task_group() as clients:
+                async with listen(self.ros, port=self.port, goals_in_new_thread=False) as server:
+                    self.port = server.port
                     task_status.started()
-                    await listener.serve(reception.receive, clients)
+                    await anyio.sleep_forever()
         finally:
             self._has_ended.set()
 

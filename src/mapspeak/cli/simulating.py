@@ -1,6 +1,7 @@
 """`mapspeak simulate` and `mapspeak demo`: the simulated robot for other programs, and at work."""
 
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import click
 from mapspeak.cli.evaluating import INTERRUPTED
 from mapspeak.cli.operating import StopKeys, Tell, stop_keys
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION, usual_modes
+from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
     from mapspeak.evaluation.runs.showing import TrialBar
@@ -47,21 +49,40 @@ def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread:
     """Offer the simulated robot to any rosbridge client, as a robot with ROS 1 or ROS 2."""
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.ros.messages.fields import Dialect  # noqa: PLC0415
-    from mapspeak.rosbridge_server import run_rosbridge_server  # noqa: PLC0415
+    from mapspeak.rosbridge_server import open_rosbridge_server  # noqa: PLC0415
     from mapspeak.simulator import Simulation, load_world  # noqa: PLC0415
+
+    host, port = _parse_address(address)
 
     async def run() -> None:
         simulation = Simulation(load_world(world), seed=seed)
-        async with open_simulated_robot(simulation, clock=Clock.REAL, has_detector=False) as robot:
-            await run_rosbridge_server(
+        async with (
+            open_simulated_robot(simulation, clock=Clock.REAL, has_detector=False) as robot,
+            open_rosbridge_server(
                 robot,
                 dialect=Dialect(f"ros{ros}"),
-                address=address,
+                host=host,
+                port=port,
                 goals_in_new_thread=goals_in_new_thread,
-                say=lambda text: click.echo(text, err=True),
-            )
+            ) as server,
+        ):
+            offered = f"{robot.description.name} in {robot.description.map_name}, ROS{ros}"
+            with anyio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
+                click.echo(f"mapspeak: {offered}: {server.url}", err=True)
+                async for _ in signals:
+                    return
 
     anyio.run(run)
+
+
+def _parse_address(address: str) -> tuple[str, int]:
+    """Read PORT or HOST:PORT; without a host this machine alone reaches it."""
+    host, _, port = address.rpartition(":")
+    if not (port.isdecimal() and port.isascii() and int(port) < 65536):
+        raise ConfigError(
+            f"{address!r} is no address to serve on.", hint="Give PORT or HOST:PORT, as 9090."
+        )
+    return host.strip("[]") or "127.0.0.1", int(port)
 
 
 MEMORY = "semantic_map.yaml"

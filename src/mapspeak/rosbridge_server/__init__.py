@@ -11,7 +11,6 @@ from mapspeak.rosbridge_server.rosapi import add_rosapi
 from mapspeak.rosbridge_server.serving import (
     RosbridgeServer,
     open_rosbridge_server,
-    run_rosbridge_server,
     serve_system,
 )
 
@@ -26,6 +25,5 @@ __all__ = [
     "add_parameter_services",
     "add_rosapi",
     "open_rosbridge_server",
-    "run_rosbridge_server",
     "serve_system",
 ]

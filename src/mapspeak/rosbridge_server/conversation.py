@@ -1,7 +1,7 @@
 """One client's operations, on goals too: done as asked, and what is wrong mostly not told."""
 
 import re
-from collections.abc import Awaitable, Mapping
+from collections.abc import Awaitable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,9 +12,15 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json
 from mapspeak.ros.messages.fields import Dialect, bare_type
-from mapspeak.rosbridge_server.connection import Outbox
 from mapspeak.rosbridge_server.drives import ServedDrive
-from mapspeak.rosbridge_server.hub import Compression, Frame, Publication, answer_frame
+from mapspeak.rosbridge_server.hub import (
+    Compression,
+    Frame,
+    Outbox,
+    Publication,
+    answer_frame,
+    fragments_of,
+)
 from mapspeak.rosbridge_server.interfaces import RosSystem, refusal
 from mapspeak.rosbridge_server.nav2 import (
     ABORTED,
@@ -27,6 +33,8 @@ from mapspeak.rosbridge_server.nav2 import (
 )
 
 Operation = Mapping[str, Any]
+LONGEST_MESSAGE = 10_000_000
+"""rosbridge's `max_message_size`: on ROS 2 longer text is cut in pieces."""
 FEEDBACK_DEPTH = 5
 
 
@@ -151,7 +159,7 @@ class ClientConversation:
         self._subscriptions: dict[str, ClientSubscription] = {}
         self._advertised: dict[str, set[str]] = {}
         self._goals = GoalOperations(stack, outbox, tasks, blocks=blocks)
-        self.fragment_length: int | None = None
+        self._fragment_length: int | None = None
         self._operations = {
             "subscribe": self._subscribe,
             "unsubscribe": self._unsubscribe,
@@ -164,8 +172,24 @@ class ClientConversation:
             self._operations["send_action_goal"] = self._goals.send
             self._operations["cancel_action_goal"] = self._goals.cancel
 
-    def frame_of(self, publication: Publication) -> Frame | None:
-        """Return a message as the client wants it; None where the real one stays silent."""
+    def frames_of(self, item: Frame | Publication) -> Iterable[Frame]:
+        """Return an answer or a message as the client wants it; a long text is cut up.
+
+        There is nothing where the real one stays silent: long CBOR is lost on ROS 2.
+        """
+        frame = self._frame_of(item) if isinstance(item, Publication) else item
+        if frame is None:
+            return ()
+        length = self._fragment_length
+        if self._stack.dialect is Dialect.ROS2:
+            if not frame.is_text:
+                return (frame,) if len(frame.data) <= LONGEST_MESSAGE else ()
+            length = min(length or LONGEST_MESSAGE, LONGEST_MESSAGE)
+        if not frame.is_text or length is None or len(frame.data) <= length:
+            return (frame,)
+        return fragments_of(frame, length=length, fragment_id="0")
+
+    def _frame_of(self, publication: Publication) -> Frame | None:
         subscription = self._subscriptions.get(publication.topic)
         compression = subscription.compression if subscription else None
         if compression is None or self._is_broken(compression, publication.type):
@@ -301,7 +325,7 @@ class ClientConversation:
         """Once asked for, pieces stay that short on the whole connection."""
         length = int(_number(operation, "fragment_size"))
         if length > 0:
-            self.fragment_length = min(length, self.fragment_length or length)
+            self._fragment_length = min(length, self._fragment_length or length)
 
 
 def _name(operation: Operation, key: str) -> str:

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mapspeak.rosbridge_server.connection import Lane, Outbox
-from mapspeak.rosbridge_server.hub import Frame, Publication
+from mapspeak.rosbridge_server.hub import Frame, Lane, Outbox, Publication
 
 pytestmark = pytest.mark.anyio
 
