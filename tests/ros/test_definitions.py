@@ -52,7 +52,7 @@ def test_a_field_is_read_as_ros_writes_it(line: str, field: Field) -> None:
 def test_constants_are_no_fields_and_remarks_say_nothing() -> None:
     text = "# An arm.\nuint8 FAST = 1 # quick\nstring MARK=#1\n\nuint8 speed"
     message = parse_definition("arm_msgs/Arm", text)
-    assert [(each.name, each.value) for each in message.constants] == [
+    assert list(message.constants.items()) == [
         ("FAST", "1"),
         ("MARK", "#1"),
     ]

@@ -7,8 +7,13 @@ import pytest
 
 from mapspeak.errors import ConfigError
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings, load_robot_file
-from mapspeak.ros.discovery.parts import NAVIGATION
-from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile, choose_profile
+from mapspeak.ros.discovery.profile import (
+    NavigationKind,
+    PoseSource,
+    RobotPart,
+    RobotProfile,
+    choose_profile,
+)
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosGraph
 
@@ -57,7 +62,6 @@ def test_a_turtlebot_4_is_understood() -> None:
     profile = choose(TURTLEBOT_4, actions=("/dock", "/navigate_to_pose"))
     assert profile.map_topic == "/map"
     assert profile.map_updates_topic == "/map_updates"
-    assert profile.other_map_topics == ("/global_costmap/costmap", "/local_costmap/costmap")
     assert profile.pose_source is PoseSource.TF
     assert profile.base_frame == "base_footprint"
     assert profile.camera_topic == "/oakd/rgb/preview/image_raw/compressed"
@@ -114,7 +118,7 @@ def test_a_move_base_that_tells_no_status_gives_way_to_a_topic_for_goals() -> No
     assert dead.navigation is NavigationKind.GOAL_TOPIC
     alone = choose(types, dialect=Dialect.ROS1, dead=("/move_base/status", "/robot/goal"))
     assert alone.navigation is NavigationKind.MOVE_BASE
-    assert not NAVIGATION.is_alive(alone)
+    assert not RobotPart.NAVIGATION.is_alive(alone)
 
 
 def test_move_bases_planner_is_named_only_where_it_answers() -> None:
@@ -131,9 +135,9 @@ def test_a_topic_that_somebody_publishes_comes_before_a_better_name() -> None:
 
 
 def test_an_action_that_robot_yaml_names_and_nobody_serves_is_not_alive() -> None:
-    assert not NAVIGATION.is_alive(choose(TURTLEBOT_4, navigation="nav2"))
+    assert not RobotPart.NAVIGATION.is_alive(choose(TURTLEBOT_4, navigation="nav2"))
     served = choose(TURTLEBOT_4, navigation="nav2", actions=("/navigate_to_pose",))
-    assert NAVIGATION.is_alive(served)
+    assert RobotPart.NAVIGATION.is_alive(served)
 
 
 def in_namespaces(*robots: str) -> dict[str, str]:

@@ -15,7 +15,7 @@ from mapspeak.errors import LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json, to_json
-from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.grids import apply_grid_update, read_grid, write_grid
 from mapspeak.ros.messages.pictures import read_compressed_image, read_image
 from mapspeak.ros.messages.poses import (
@@ -23,7 +23,6 @@ from mapspeak.ros.messages.poses import (
     FrameTransform,
     Twist,
     read_pose_stamped,
-    read_pose_with_covariance,
     read_transforms,
     read_twist,
     write_pose_stamped,
@@ -32,9 +31,8 @@ from mapspeak.ros.messages.poses import (
     write_twist,
 )
 from mapspeak.ros.messages.scans import (
-    CameraInfo,
     LaserScan,
-    read_camera_info,
+    read_fov_rad,
     read_scan,
     write_camera_info,
     write_scan,
@@ -44,7 +42,13 @@ from mapspeak.spatial import OccupancyGrid
 GRID = OccupancyGrid(cells=np.zeros((2, 3), dtype=np.int8), resolution_m=0.05)
 HERE = FramedPose(pose=Pose(1.0, 2.0, 0.5), frame_id="map", stamp_s=1.0)
 LINK = FrameTransform(parent_from_child=Pose(1.0, 0.0), parent="map", child="odom", stamp_s=1.0)
-CAMERA = CameraInfo(width_px=4, height_px=2, horizontal_fov_rad=1.0, frame_id="camera", stamp_s=1.0)
+CAMERA = write_camera_info(
+    write_header("camera", 1.0, dialect=Dialect.ROS1),
+    width_px=4,
+    height_px=2,
+    horizontal_fov_rad=1.0,
+    dialect=Dialect.ROS1,
+)
 SCAN = LaserScan(
     ranges_m=np.ones(3),
     first_angle_rad=0.0,
@@ -68,9 +72,9 @@ READERS: dict[str, tuple[Reader, Any]] = {
     "grid": (read_grid, write_grid(GRID, dialect=Dialect.ROS1)),
     "update": (lambda message: apply_grid_update(GRID, message), UPDATE),
     "pose": (read_pose_stamped, write_pose_stamped(HERE, dialect=Dialect.ROS2)),
-    "estimate": (read_pose_with_covariance, write_pose_with_covariance(HERE, dialect=Dialect.ROS1)),
+    "estimate": (read_pose_stamped, write_pose_with_covariance(HERE, dialect=Dialect.ROS1)),
     "transforms": (read_transforms, write_transforms([LINK], dialect=Dialect.ROS2)),
-    "camera": (read_camera_info, write_camera_info(CAMERA, dialect=Dialect.ROS1)),
+    "camera": (read_fov_rad, CAMERA),
     "scan": (read_scan, write_scan(SCAN, dialect=Dialect.ROS2)),
     "twist": (read_twist, write_twist(TWIST)),
     "image": (read_image, IMAGE),

@@ -4,8 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from mapspeak.ros.discovery.parts import find_missing, improve
-from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile
+from mapspeak.ros.discovery.profile import (
+    NavigationKind,
+    PoseSource,
+    RobotProfile,
+    find_missing,
+    improve,
+)
 from mapspeak.ros.messages.fields import Dialect
 
 WHOLE = RobotProfile(
@@ -38,7 +43,7 @@ def later(
 def test_what_is_missing_is_told_by_its_key_in_robot_yaml() -> None:
     assert find_missing(WHOLE) == ()
     without = replace(WHOLE, scan_topic=None, radius_source="")
-    assert [part.key for part in find_missing(without)] == ["scan_topic", "radius_m"]
+    assert list(find_missing(without)) == ["scan_topic", "radius_m"]
     assert len(find_missing(BARE)) == 7
 
 
@@ -68,7 +73,7 @@ def test_another_map_is_taken_only_as_long_as_the_robot_is_being_found(
 
 def test_a_topic_is_alive_again_once_somebody_publishes_it() -> None:
     dead = replace(WHOLE, dead_topics=frozenset({"/image"}))
-    assert [part.key for part in find_missing(dead)] == ["camera_topic"]
+    assert list(find_missing(dead)) == ["camera_topic"]
     assert later(dead, WHOLE).dead_topics == frozenset()
     assert later(WHOLE, dead).dead_topics == frozenset()
 

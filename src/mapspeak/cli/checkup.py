@@ -18,8 +18,13 @@ from mapspeak.cli.robots import RobotChoice, open_robot
 from mapspeak.errors import LinkError, MapError, MapspeakError
 from mapspeak.hold import Hold
 from mapspeak.robot import RangeScan, Robot
-from mapspeak.ros.discovery.parts import CAMERA, LASER, MAP, NAVIGATION, VELOCITY, RobotPart, Worth
-from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile
+from mapspeak.ros.discovery.profile import (
+    NavigationKind,
+    PoseSource,
+    RobotPart,
+    RobotProfile,
+    Worth,
+)
 from mapspeak.ros.port import LinkKind, LinkName
 from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
@@ -239,13 +244,13 @@ def describe_profile(
         Finding(what="link", health=Health.FINE, said=_say_link(link) + (reason and f", {reason}")),
         Finding(what="ROS", health=Health.FINE, said=f"{ros}, {distro}"),
         *_describe_namespace(profile),
-        _describe(MAP, "map topic", profile, START_MAP, Health.MISSING, more=age),
+        _describe(RobotPart.MAP, "map topic", profile, START_MAP, Health.MISSING, more=age),
         _describe_pose(profile),
-        _describe(CAMERA, "camera topic", profile, START_CAMERA),
-        _describe(LASER, "scan topic", profile, START_LASER),
+        _describe(RobotPart.CAMERA, "camera topic", profile, START_CAMERA),
+        _describe(RobotPart.LASER, "scan topic", profile, START_LASER),
         _describe_navigation(profile),
         _describe_planner(profile),
-        _describe(VELOCITY, "velocity topic", profile, START_VELOCITY),
+        _describe(RobotPart.VELOCITY, "velocity topic", profile, START_VELOCITY),
         _describe_radius(profile),
     )
 
@@ -315,7 +320,7 @@ def _describe_radius(profile: RobotProfile) -> Finding:
 
 def _describe_navigation(profile: RobotProfile) -> Finding:
     what, name = "navigation", profile.navigation_name
-    worth = NAVIGATION.worth(profile)
+    worth = RobotPart.NAVIGATION.worth(profile)
     if worth is Worth.MISSING:
         return Finding(what=what, health=Health.MISSING, said="none found", hint=START_NAVIGATION)
     if worth is Worth.NAMED:

@@ -140,12 +140,10 @@ class Startable(Protocol):
     @property
     def is_busy(self) -> bool:
         """True while a goal of ours is under way, or may be."""
-        ...
 
     @property
     def owners(self) -> frozenset[str]:
         """The clients with whom goals end that are under way."""
-        ...
 
     async def end(self) -> bool:
         """End every goal of ours, also one that the robot takes only later.
@@ -155,7 +153,6 @@ class Startable(Protocol):
         Raises:
             LinkError: Says what could not be ended.
         """
-        ...
 
 
 class Started:

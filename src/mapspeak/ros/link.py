@@ -26,10 +26,6 @@ class Announcements:
 
     What was told is never taken back for being late: rosbridge shows a publisher for ten seconds
     more, so that a robot that is not to hear of it must not be told in the first place.
-
-    Args:
-        tell: Tells the robot of a topic and its type.
-        take_back: Takes that back.
     """
 
     def __init__(self, tell: Callable[[str, str], None], take_back: Callable[[str], None]) -> None:
@@ -92,12 +88,7 @@ async def say_again(say: Callable[[], object]) -> None:
 
 @dataclass(slots=True, eq=False)
 class TopicRequest:
-    """How a topic was asked for; each link adds how it is read.
-
-    Attributes:
-        is_bulky: Its messages hold large arrays.
-        throttle_ms: The least time between two messages.
-    """
+    """How a topic was asked for; each link adds how it is read."""
 
     subscription: Subscription
     is_bulky: bool
@@ -109,11 +100,7 @@ Request = TypeVar("Request", bound=TopicRequest)
 
 
 class RosLink(ParameterServices, Generic[Request]):
-    """The part of the port that is the same over every connection; it raises what the port says.
-
-    Attributes:
-        announcements: What we publish, or would.
-    """
+    """The part of the port that is the same over every connection; it raises what the port says."""
 
     def __init__(self, request_type: type[Request]) -> None:
         self._request_type = request_type

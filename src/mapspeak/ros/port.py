@@ -101,40 +101,32 @@ class RosConnection(Protocol):
     @property
     def link(self) -> LinkName:
         """How we are connected."""
-        ...
 
     @property
     def is_open(self) -> bool:
         """True when something can be sent at once."""
-        ...
 
     @property
     def connected_for_s(self) -> float | None:
         """Since when topics and goals have been connected, in wall time; None while not."""
-        ...
 
     @property
     def lost_for_s(self) -> float | None:
         """Since when the connection has been lost, in wall time; None while there is one."""
-        ...
 
     @property
     def own_ends(self) -> OwnEnds:
         """What of the system is our own doing: answers about it do not take it for others'."""
-        ...
 
     @property
     def started(self) -> Started:
         """Everything that was started over this connection: a stop ends it."""
-        ...
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run something in the background until the connection is closed."""
-        ...
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when the connection is open again."""
-        ...
 
     def subscribe(
         self,
@@ -146,29 +138,21 @@ class RosConnection(Protocol):
     ) -> Subscription:
         """Return the subscription to a topic, which is begun where there is none yet.
 
-        Args:
-            topic: Its full name.
-            type_name: As this ROS writes it; None looks it up.
-            is_bulky: Messages hold large arrays: maps, scans, pictures.
-            throttle_ms: The least time between two messages.
+        The type is as this ROS writes it; None looks it up. Bulky messages hold large arrays: maps,
+        scans, pictures. Throttling keeps a least time between two messages.
         """
-        ...
 
     def unsubscribe(self, subscription: Subscription) -> None:
         """End one use of a subscription; the last one ends it at the robot too."""
-        ...
 
     def renew(self, subscription: Subscription) -> None:
         """Subscribe again, perhaps in another way: a latched message may have been missed."""
-        ...
 
     def advertise(self, topic: str, *, type_name: str) -> None:
         """Say that we will publish; the robot needs a moment until it listens."""
-        ...
 
     def unadvertise(self, topic: str) -> None:
         """Take back what `advertise` said; do nothing for what was not advertised."""
-        ...
 
     def advertise_late(self) -> None:
         """Tell the robot of what is advertised from now on only with the first message there.
@@ -176,22 +160,18 @@ class RosConnection(Protocol):
         For one that is only watched: it should not look as if we drove it. A stop is then said for
         a second, until the robot has noticed who speaks.
         """
-        ...
 
     def advertise_early(self) -> None:
         """Tell the robot at once of all that is advertised, now and from now on.
 
         For whoever may move it, so that a stop is heard at once; so it is from the beginning.
         """
-        ...
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish on an advertised topic."""
-        ...
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
         """Publish at once by every way that is open, and return how many: for a stop."""
-        ...
 
     async def call_service(
         self,
@@ -203,91 +183,64 @@ class RosConnection(Protocol):
     ) -> dict[str, Any]:
         """Return what a service answers.
 
-        Args:
-            service: Its full name.
-            arguments: The fields of the request; None for none.
-            type_name: None looks it up.
-            timeout_s: None takes the usual limit.
+        Where no type is given it is looked up; where no limit is, the usual one is taken.
         """
-        ...
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""
-        ...
 
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Ask for the end of a goal that the server has taken; its `end` tells if that worked."""
-        ...
 
     def give_up_goal(self, goal: ActionGoal) -> None:
         """Let a goal without a sign of life hold up nothing; what is heard of it is told on."""
-        ...
 
     def clear_the_way(self) -> None:
         """Make sure that what is sent next is not held up by what was sent before: for a stop."""
-        ...
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are."""
-        ...
 
     async def fetch_topics(self) -> Mapping[str, str]:
         """Return the type of each topic, as "package/Type"; costs less than the whole graph."""
-        ...
 
     async def fetch_time_s(self) -> float | None:
         """Return robot time; None where the robot does not say."""
-        ...
 
     async def fetch_nodes(self) -> tuple[str, ...]:
         """Return the full names of all nodes, in their order."""
-        ...
 
     async def fetch_node(self, node: str) -> NodeLinks:
         """Return what a node publishes, subscribes to and serves."""
-        ...
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish on a topic."""
-        ...
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that listen to a topic."""
-        ...
 
     async def fetch_services(self) -> tuple[str, ...]:
         """Return the full names of all services, in their order."""
-        ...
 
     async def fetch_service_type(self, service: str) -> str:
         """Return a service's type, as "package/Type"."""
-        ...
 
     async def fetch_action_type(self, action: str) -> str:
         """Return an action's type, as "package/Type"."""
-        ...
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Return the .msg texts of a type and of every type within it.
+        """Return the .msg texts of a type and of every type within it; empty where unknown.
 
-        Args:
-            type_name: Of a message, a service or an action, such as "nav_msgs/srv/GetMap" or
-                "std_msgs/String".
-
-        Returns:
-            By name as "package/Type", the type itself first. A service has the two names
-            "package/Type_Request" and "package/Type_Response", an action "package/Type_Goal",
-            "package/Type_Result" and "package/Type_Feedback". Empty where nobody knows the type.
+        They are by name as "package/Type", the type itself first. A service has the two names
+        "package/Type_Request" and "package/Type_Response", an action "package/Type_Goal",
+        "package/Type_Result" and "package/Type_Feedback".
         """
-        ...
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
         """Return the names of a node's parameters; ROS 1 keeps them below the node's name."""
-        ...
 
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
         """Return the value of a node's parameter; None where it is not set."""
-        ...
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
         """Set a node's parameter; None deletes it.
@@ -295,7 +248,6 @@ class RosConnection(Protocol):
         Raises:
             LinkError: The node refuses it, and says why.
         """
-        ...
 
 
 def started_over(connection: RosConnection | None) -> Started:

@@ -1,7 +1,7 @@
 """The tree of coordinate frames that ROS keeps in /tf and /tf_static, as far as it was heard."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from functools import partial
 
 import anyio
 
@@ -22,22 +22,17 @@ TF_HINT = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
-    transform: FrameTransform
-    is_static: bool
-
-
 class TransformTree:
     """The newest transform of each frame to its parent."""
 
     def __init__(self) -> None:
-        self._to_parent: dict[str, _Known] = {}
+        self._to_parent: dict[str, FrameTransform] = {}
+        self._static: set[str] = set()
 
     @property
     def frames(self) -> frozenset[str]:
         """All frames that have been heard of."""
-        parents = (known.transform.parent for known in self._to_parent.values())
+        parents = (known.parent for known in self._to_parent.values())
         return frozenset(self._to_parent) | frozenset(parents)
 
     def take(self, transforms: Iterable[FrameTransform], *, is_static: bool) -> bool:
@@ -50,9 +45,10 @@ class TransformTree:
             known = self._to_parent.get(transform.child)
             if known is None and len(self._to_parent) >= MAX_FRAMES:
                 continue
-            if known is None or not _is_latecomer(transform, known):
-                is_news = is_news or known is None or known.transform != transform
-                self._to_parent[transform.child] = _Known(transform, is_static)
+            if known is None or not 0.0 < known.stamp_s - transform.stamp_s < CLOCK_JUMP_S:
+                is_news = is_news or known != transform
+                self._to_parent[transform.child] = transform
+                (self._static.add if is_static else self._static.discard)(transform.child)
         return is_news
 
     def find(self, *, outer: str, inner: str) -> StampedPose:
@@ -66,42 +62,39 @@ class TransformTree:
         outer_from_inner = Pose(0.0, 0.0, 0.0)
         stamps: list[float] = []
         for known in self._way_up(outer=outer, inner=inner):
-            outer_from_inner = known.transform.parent_from_child @ outer_from_inner
-            if not known.is_static:
-                stamps.append(known.transform.stamp_s)
+            outer_from_inner = known.parent_from_child @ outer_from_inner
+            if known.child not in self._static:
+                stamps.append(known.stamp_s)
         return StampedPose(outer_from_inner, min(stamps, default=0.0))
 
-    def find_ways(
-        self, one: str, other: str
-    ) -> tuple[tuple[FrameTransform, ...], tuple[FrameTransform, ...]]:
+    def find_ways(self, one: str, other: str) -> tuple[list[FrameTransform], list[FrameTransform]]:
         """Return the transforms from each of two frames up to the first that both lie in."""
         above = [one]
-        while (known := self._to_parent.get(above[-1])) and known.transform.parent not in above:
-            above.append(known.transform.parent)
+        while (known := self._to_parent.get(above[-1])) and known.parent not in above:
+            above.append(known.parent)
         for outer in above:
             try:
                 up = self._way_up(outer=outer, inner=other)
             except LinkError:
                 continue
-            own = self._way_up(outer=outer, inner=one)
-            return tuple(k.transform for k in own), tuple(k.transform for k in up)
+            return self._way_up(outer=outer, inner=one), up
         raise self._gap(outer=one, passed=[other])
 
-    def _way_up(self, *, outer: str, inner: str) -> list[_Known]:
-        way: list[_Known] = []
+    def _way_up(self, *, outer: str, inner: str) -> list[FrameTransform]:
+        way: list[FrameTransform] = []
         passed = [inner]
         while passed[-1] != outer:
             known = self._to_parent.get(passed[-1])
             if known is None:
                 raise self._gap(outer=outer, passed=passed)
-            if known.transform.parent in passed:
-                circle = " -> ".join([*passed, known.transform.parent])
+            if known.parent in passed:
+                circle = " -> ".join([*passed, known.parent])
                 raise LinkError(
                     f"The robot's TF tree goes round in a circle: {circle}.",
                     hint="Two nodes publish contradicting transforms: stop one of them.",
                 )
             way.append(known)
-            passed.append(known.transform.parent)
+            passed.append(known.parent)
         return way
 
     def _gap(self, *, outer: str, passed: list[str]) -> LinkError:
@@ -119,11 +112,6 @@ class TransformTree:
             f"{outer!r}.",
             hint=TF_HINT,
         )
-
-
-def _is_latecomer(transform: FrameTransform, known: _Known) -> bool:
-    behind_s = known.transform.stamp_s - transform.stamp_s
-    return 0.0 < behind_s < CLOCK_JUMP_S
 
 
 class FrameListener:
@@ -144,7 +132,10 @@ class FrameListener:
 
     def listen(self, moving_topic: str, static_topic: str, *, dialect: Dialect) -> None:
         """Subscribe to both topics, also before anybody publishes them, and to no others."""
-        wanted = {moving_topic: self._take_moving, static_topic: self._take_static}
+        wanted = {
+            moving_topic: partial(self._take, is_static=False),
+            static_topic: partial(self._take, is_static=True),
+        }
         for topic in self._subscriptions.keys() - wanted.keys():
             self._connection.unsubscribe(self._subscriptions.pop(topic))
         type_name = dialect.type_name("tf2_msgs/TFMessage")
@@ -165,12 +156,6 @@ class FrameListener:
     async def wait_for_news(self) -> None:
         """Return after the next message."""
         await self._news.wait()
-
-    def _take_moving(self, message: Message) -> None:
-        self._take(message, is_static=False)
-
-    def _take_static(self, message: Message) -> None:
-        self._take(message, is_static=True)
 
     def _take(self, message: Message, *, is_static: bool) -> None:
         try:

@@ -26,11 +26,7 @@ class Compression(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One websocket message.
-
-    Attributes:
-        data: UTF-8 text, or bytes.
-    """
+    """One websocket message: UTF-8 text, or bytes."""
 
     data: bytes
     is_text: bool

@@ -11,16 +11,12 @@ import numpy as np
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.definitions.texts import GENERATED, known_definitions, write_definition
 from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
+from mapspeak.ros.definitions.typestore import name_in_ros2
 from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub
 from mapspeak.rosbridge_server.nav2 import Nav2
 
 ROS2_DISTRIBUTION = "jazzy"
-
-KIND_OF_GENERATED = {
-    **dict.fromkeys(("Request", "Response"), "srv"),
-    **dict.fromkeys(("Goal", "Result", "Feedback", "FeedbackMessage"), "action"),
-}
 
 NO_MORE: Mapping[str, str] = MappingProxyType({})
 Values = dict[str, Any]
@@ -46,12 +42,8 @@ class Interfaces:
 
     def said(self, name: str) -> str:
         """Return a type's name as this ROS writes it; one that is no message keeps its name."""
-        generated = GENERATED.search(name)
-        if "/" not in name or self._dialect is Dialect.ROS1:
-            return name
-        kind = "msg" if generated is None else KIND_OF_GENERATED[generated[1]]
-        package, _, last = bare_type(name).partition("/")
-        return f"{package}/{kind}/{last}"
+        is_said = "/" not in name or self._dialect is Dialect.ROS1
+        return name if is_said else name_in_ros2(name)
 
     def knows(self, name: str) -> bool:
         """Return True for a type that is described here, however its name is written."""
@@ -140,8 +132,8 @@ class Interfaces:
                 -1 if each.length is None else each.length for each in message.fields
             ],
             "examples": [_example(each) for each in message.fields],
-            "constnames": [each.name for each in message.constants],
-            "constvalues": [each.value for each in message.constants],
+            "constnames": list(message.constants),
+            "constvalues": list(message.constants.values()),
         }
 
 
@@ -173,13 +165,7 @@ LOGGED_ERROR = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Service:
-    """One service.
-
-    Attributes:
-        name: With its leading slash.
-        type: As "package/Type".
-        answer: Gives the response for a request; None for a service that never answers.
-    """
+    """One service; it never answers where there is no function that does."""
 
     name: str
     type: str

@@ -1,21 +1,12 @@
 """The parameters of the robot's nodes: ROS 1 keeps them in one place, ROS 2 with each node."""
 
 from collections.abc import Mapping
-from typing import Any
 
-from mapspeak.errors import LinkError
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.rosbridge_server.interfaces import Answer, RosSystem, Values
+from mapspeak.ros.parameters import FIELD_OF_KIND, KIND_OF, NOT_SET
+from mapspeak.rosbridge_server.interfaces import Answer, Interfaces, RosSystem, Values
 
 ROS1_DISTRIBUTION = "noetic\n"
-NOT_SET = 0
-KINDS: dict[type, tuple[int, str]] = {
-    bool: (1, "bool_value"),
-    int: (2, "integer_value"),
-    float: (3, "double_value"),
-    str: (4, "string_value"),
-}
-"""What rcl_interfaces/ParameterType calls each kind, and the field of ParameterValue it fills."""
 
 
 class Parameters:
@@ -72,12 +63,12 @@ class Parameters:
 def add_parameter_services(system: RosSystem, parameters: Parameters) -> None:
     """Offer for each node what every node of ROS 2 offers about its parameters."""
     for node in parameters.nodes:
-        for name, answer in _answers_of(node, parameters).items():
+        for name, answer in _answers_of(node, parameters, system.interfaces).items():
             last = name.title().replace("_", "")
             system.offer_typed(f"{node}/{name}", f"rcl_interfaces/{last}", node=node, answer=answer)
 
 
-def _answers_of(node: str, parameters: Parameters) -> dict[str, Answer]:
+def _answers_of(node: str, parameters: Parameters, interfaces: Interfaces) -> dict[str, Answer]:
     def find_all(request: Values) -> list[tuple[str, object]]:
         values = parameters.of_node(node)
         return [(name, values.get(name)) for name in request["names"]]
@@ -95,13 +86,15 @@ def _answers_of(node: str, parameters: Parameters) -> dict[str, Answer]:
         ]
         return {"descriptors": descriptors}
 
+    def write(value: object) -> Values:
+        kind = _kind_of(value)
+        filled = {FIELD_OF_KIND[kind]: value} if kind else {}
+        return interfaces.fill("rcl_interfaces/ParameterValue", {"type": kind, **filled})
+
     def set_one(parameter: Values) -> Values:
-        name, known = parameter["name"], parameters.of_node(node)
+        name, given, known = parameter["name"], parameter["value"], parameters.of_node(node)
+        value = given.get(FIELD_OF_KIND.get(given["type"]))
         reason = ""
-        try:
-            value = _read(parameter["value"])
-        except LinkError as error:
-            return {"successful": False, "reason": error.message}
         if name not in known:
             reason = f"parameter '{name}' has not been declared"
         elif type(value) is not type(known[name]):
@@ -112,7 +105,7 @@ def _answers_of(node: str, parameters: Parameters) -> dict[str, Answer]:
 
     return {
         "list_parameters": list_names,
-        "get_parameters": lambda request: {"values": [_written(v) for _, v in find_all(request)]},
+        "get_parameters": lambda request: {"values": [write(v) for _, v in find_all(request)]},
         "get_parameter_types": lambda request: {
             "types": bytes(_kind_of(value) for _, value in find_all(request))
         },
@@ -124,20 +117,4 @@ def _answers_of(node: str, parameters: Parameters) -> dict[str, Answer]:
 
 
 def _kind_of(value: object) -> int:
-    return KINDS[type(value)][0] if type(value) in KINDS else NOT_SET
-
-
-def _written(value: object) -> Values:
-    """Write rcl_interfaces/ParameterValue: one field is meant, the others are empty."""
-    empty: Values = {field: kind() for kind, (_, field) in KINDS.items()}
-    arrays = ("byte", "bool", "integer", "double", "string")
-    empty |= {f"{each}_array_value": [] for each in arrays}
-    filled = {KINDS[type(value)][1]: value} if type(value) in KINDS else {}
-    return {"type": _kind_of(value), **empty, **filled}
-
-
-def _read(message: Mapping[str, Any]) -> object:
-    for number, field in KINDS.values():
-        if message["type"] == number:
-            return message[field]
-    raise LinkError(f"A parameter of type {message['type']} is not known.", hint="Use 1 to 4.")
+    return KIND_OF.get(type(value), NOT_SET)

@@ -21,13 +21,7 @@ NEVER_ANSWERED_ON_ROS2 = ("message_details", "get_param_names")
 
 
 def add_rosapi(system: RosSystem, parameters: Parameters, clock: Callable[[], float]) -> None:
-    """Add rosapi's services to those there are.
-
-    Args:
-        system: What they tell of, and where they are added.
-        parameters: Its nodes'.
-        clock: Gives robot time, in seconds.
-    """
+    """Add rosapi's services to those there are; the clock gives robot time in seconds."""
     answers = (
         _about_topics(system)
         | _about_nodes_and_services(system)

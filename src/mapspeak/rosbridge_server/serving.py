@@ -33,11 +33,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RosbridgeServer:
-    """A server that runs.
-
-    Attributes:
-        url: Where clients find it, as "ws://127.0.0.1:9090".
-    """
+    """A server that runs; its address is as "ws://127.0.0.1:9090"."""
 
     url: str
     port: int
@@ -51,14 +47,10 @@ async def serve_system(
     port: int = 0,
     goals_in_new_thread: bool = True,
 ) -> AsyncGenerator[RosbridgeServer]:
-    """Offer a ROS as a rosbridge server while the context lasts.
+    """Offer a ROS as a rosbridge server while the context lasts; port 0 takes any that is free.
 
-    Args:
-        system: What clients find.
-        host: Where to listen.
-        port: Where to listen; 0 takes any that is free.
-        goals_in_new_thread: A goal does not hold up its client's further operations, as in newer
-            versions of rosbridge.
+    With goals in a new thread, one does not hold up its client's further operations, as in newer
+    versions of rosbridge.
 
     Raises:
         ConfigError: The address cannot be listened on.
@@ -124,10 +116,7 @@ def open_rosbridge_server(
 ) -> AbstractAsyncContextManager[RosbridgeServer]:
     """Offer a robot as a rosbridge server with rosapi, as `serve_system` does.
 
-    Args:
-        robot: Its `sleep` must give way to other tasks: time passes here, and only by it.
-        dialect: Which ROS to be.
-        host: Likewise, as are the others.
+    The robot's `sleep` must give way to other tasks: time passes here, and only by it.
     """
     return serve_system(
         RosStack(robot, dialect=dialect),

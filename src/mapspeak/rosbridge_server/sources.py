@@ -10,9 +10,8 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.robot import RangeScan, Robot, StampedPose
-from mapspeak.ros.messages.fields import Dialect, write_stamp
+from mapspeak.ros.messages.fields import Dialect, write_header, write_stamp
 from mapspeak.ros.messages.grids import write_grid
-from mapspeak.ros.messages.pictures import EncodedPicture, write_compressed_image
 from mapspeak.ros.messages.poses import (
     FramedPose,
     FrameTransform,
@@ -21,7 +20,7 @@ from mapspeak.ros.messages.poses import (
     write_pose_with_covariance,
     write_transforms,
 )
-from mapspeak.ros.messages.scans import CameraInfo, LaserScan, write_camera_info, write_scan
+from mapspeak.ros.messages.scans import LaserScan, write_camera_info, write_scan
 from mapspeak.rosbridge_server.drives import BASE_FRAME
 from mapspeak.rosbridge_server.hub import Hub
 from mapspeak.spatial import OccupancyGrid
@@ -40,12 +39,7 @@ N_BEAMS = 720
 
 @dataclass(slots=True)
 class Source:
-    """Something published again and again.
-
-    Attributes:
-        period_s: Robot time between two.
-        due_s: Robot time of the next.
-    """
+    """Something published again and again, in robot time."""
 
     produce: Callable[[], Awaitable[None]]
     period_s: float
@@ -123,23 +117,17 @@ class Sources:
             return
         self._has_looked = True
         taken = await self._robot.fetch_picture()
-        picture = EncodedPicture(
-            data=taken.data,
-            media_type=taken.media_type,
-            width_px=taken.width_px,
-            height_px=taken.height_px,
-            frame_id=CAMERA_FRAME,
-            stamp_s=taken.stamp_s,
-        )
-        info = CameraInfo(
+        header = write_header(CAMERA_FRAME, taken.stamp_s, dialect=self._dialect)
+        form = taken.media_type.removeprefix("image/")
+        self._hub.publish(IMAGE_TOPIC, {"header": header, "format": form, "data": taken.data})
+        info = write_camera_info(
+            header,
             width_px=taken.width_px,
             height_px=taken.height_px,
             horizontal_fov_rad=taken.horizontal_fov_rad,
-            frame_id=CAMERA_FRAME,
-            stamp_s=taken.stamp_s,
+            dialect=self._dialect,
         )
-        self._hub.publish(IMAGE_TOPIC, write_compressed_image(picture, dialect=self._dialect))
-        self._hub.publish(INFO_TOPIC, write_camera_info(info, dialect=self._dialect))
+        self._hub.publish(INFO_TOPIC, info)
 
     async def _publish_scan(self) -> None:
         if not self._hub.is_wanted(SCAN_TOPIC):

@@ -9,6 +9,7 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
 from mapspeak.robot import Robot, RobotDescription
+from mapspeak.ros.discovery.watch import COSTMAPS
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FramedPose, read_twist
@@ -34,11 +35,6 @@ CAMERA_NODE, LASER_NODE = "/camera", "/laser"
 STATE_NODE = "/robot_state_publisher"
 SLAM_NODES = {Dialect.ROS1: "/slam_gmapping", Dialect.ROS2: "/slam_toolbox"}
 NAVIGATORS = {Dialect.ROS1: "/move_base", Dialect.ROS2: "/bt_navigator"}
-COSTMAPS = {
-    Dialect.ROS1: ("/move_base", "global_costmap/"),
-    Dialect.ROS2: ("/global_costmap/global_costmap", ""),
-}
-"""The nodes that hold the global costmap's parameters, and how the names of these begin."""
 
 
 def topics_of(dialect: Dialect, offered: RobotDescription) -> list[Topic]:
@@ -103,7 +99,7 @@ def parameters_of(dialect: Dialect, *, radius_m: float) -> Parameters:
         NAVIGATORS[dialect]: {"global_frame": "map", "robot_base_frame": BASE_FRAME},
         BASE_NODE: {"robot_radius": radius_m},
     }
-    costmap, prefix = COSTMAPS[dialect]
+    costmap, prefix = COSTMAPS[dialect][0]
     by_node.setdefault(costmap, {})[f"{prefix}robot_radius"] = radius_m
     return Parameters(dialect, by_node)
 

@@ -166,12 +166,7 @@ class ActionClient(ABC):
         self._tell()
 
     def expect_feedback(self, *, within_s: float, now_s: Callable[[], float]) -> None:
-        """Take for lost a goal whose feedback has come once, and then stays away for so long.
-
-        Args:
-            within_s: In robot time.
-            now_s: Tells robot time.
-        """
+        """Take for lost a goal whose feedback has come once and then stays away; in robot time."""
         self._feedback_within_s, self._now_s = within_s, now_s
 
     # --- what is done

@@ -48,8 +48,8 @@ class _Describer:
         for field in message.fields:
             lines += self._of_field(field, depth)
         if message.constants:
-            shown = [f"{each.name}={each.value}" for each in message.constants[:MOST_CONSTANTS]]
-            lines.append(f"{INDENT * depth}# constants: {', '.join(shown)}")
+            shown = [f"{name}={value}" for name, value in message.constants.items()]
+            lines.append(f"{INDENT * depth}# constants: {', '.join(shown[:MOST_CONSTANTS])}")
         return lines
 
     def _of_field(self, field: Field, depth: int) -> list[str]:
@@ -88,12 +88,8 @@ def check_message(book: TypeBook, type_name: str, message: object) -> dict[str, 
     """Return a message as it may be sent: fields left out stay out, whole numbers become floats.
 
     Every message goes through here before it is sent: no link looks at what it is given, but
-    rosbridge's, which sees to what JSON can hold.
-
-    Args:
-        book: Describes the type and all types within.
-        type_name: Of the message.
-        message: Lists of numbers may be numpy arrays; uint8[] may be bytes or, as in JSON, base64.
+    rosbridge's, which sees to what JSON can hold. Lists of numbers may be numpy arrays; uint8[] may
+    be bytes or, as in JSON, base64.
 
     Raises:
         LinkError: It does not fit; says the field's path and what its type wants.

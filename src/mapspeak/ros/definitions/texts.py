@@ -23,9 +23,7 @@ GENERATED = re.compile(r"_(Request|Response|Goal|Result|FeedbackMessage|Feedback
 def split_definition(type_name: str, text: str) -> dict[str, str]:
     """Return the text of a type and of each type within it, by name as "package/Type".
 
-    Args:
-        type_name: Of the first.
-        text: All of them, with a ruler and "MSG: package/Type" before each but the first.
+    A ruler and "MSG: package/Type" stand before each but the first.
     """
     first, *rest = RULER.split(text)
     texts = {bare_type(type_name): first.strip("\n")}
@@ -53,9 +51,7 @@ def name_parts(type_name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def split_parts(type_name: str, text: str) -> dict[str, str]:
     """Return the texts of a message, or of the parts of a service or an action, by their names.
 
-    Args:
-        type_name: As "package/Type".
-        text: As in a .msg, .srv or .action file; two parts are a service, three an action.
+    Two parts are a service, three an action, as in .srv and .action files.
     """
     parts = [part.strip("\n") for part in DIVIDER.split(text)]
     names = {2: name_parts(type_name)[0], 3: name_parts(type_name)[1]}.get(len(parts))
@@ -119,11 +115,8 @@ DEFAULTS = {
 def known_definitions(dialect: Dialect, *, distro: str = "") -> dict[str, str]:
     """Return the texts of all types that come with mapspeak, by name as "package/Type".
 
-    The parts of services and actions are named as `RosConnection.fetch_definitions` says.
-
-    Args:
-        dialect: Which ROS.
-        distro: Of ROS 2, such as "jazzy"; the usual one where it is none that is known.
+    The parts of services and actions are named as `RosConnection.fetch_definitions` says. Where a
+    distribution of ROS 2, such as "jazzy", is not known, the usual one stands for it.
     """
     return dict(_definitions(dialect, distro if distro in DISTROS else DISTROS[0]))
 

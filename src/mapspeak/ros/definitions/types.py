@@ -60,21 +60,12 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Constant:
-    """A value that a message type gives a name to; the value is left as text."""
-
-    name: str
-    type: str
-    value: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MessageType:
-    """What messages of one type look like."""
+    """What messages of one type look like; the values of constants are left as text, by name."""
 
     name: str
     fields: tuple[Field, ...]
-    constants: tuple[Constant, ...] = ()
+    constants: Mapping[str, str]
 
     def find(self, name: str) -> Field | None:
         """Find a field by its name."""
@@ -82,24 +73,19 @@ class MessageType:
 
 
 def parse_definition(type_name: str, text: str) -> MessageType:
-    """Read the text of one message type; lines that say nothing are passed over.
-
-    Args:
-        type_name: Of the type; its package is that of types named without one.
-        text: As in a .msg file, remarks included.
-    """
+    """Read the text of one message type; lines that say nothing are passed over."""
     package = type_name.partition("/")[0]
     fields: list[Field] = []
-    constants: list[Constant] = []
+    constants: dict[str, str] = {}
     for line in text.splitlines():
         found = LINE.fullmatch(line.strip())
         if found is None or line.strip().startswith("#"):
             continue
         if found["rest"].startswith("="):
-            constants.append(_constant(found))
+            constants[found["name"]] = _value_of(found)
         else:
             fields.append(_field(found, package))
-    return MessageType(name=bare_type(type_name), fields=tuple(fields), constants=tuple(constants))
+    return MessageType(name=bare_type(type_name), fields=tuple(fields), constants=constants)
 
 
 def find_odd_lines(text: str) -> list[str]:
@@ -118,12 +104,10 @@ def _is_odd(line: str) -> bool:
     return bool(rest) and not rest.startswith("=") and found["type"] not in PLAIN
 
 
-def _constant(found: re.Match[str]) -> Constant:
-    value = found["rest"].removeprefix("=").strip()
-    if found["type"] not in TEXTS:
-        # In a text the sign for a remark is a sign like any other.
-        value = value.partition("#")[0].strip()
-    return Constant(name=found["name"], type=found["type"], value=value)
+def _value_of(constant: re.Match[str]) -> str:
+    value = constant["rest"].removeprefix("=").strip()
+    # In a text the sign for a remark is a sign like any other.
+    return value if constant["type"] in TEXTS else value.partition("#")[0].strip()
 
 
 def _field(found: re.Match[str], package: str) -> Field:
@@ -157,11 +141,7 @@ MOST_NESTED = 32
 
 
 class TypeBook:
-    """Message types by their names, each read when it is first asked for.
-
-    Args:
-        texts: Definitions by name, as "package/Type".
-    """
+    """Message types by their names, each read when it is first asked for."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
         self.texts = {bare_type(name): text for name, text in texts.items()}

@@ -68,11 +68,7 @@ def look_up(book: TypeBook, name: str, *, above: tuple[str, ...]) -> MessageType
 
 
 def describe_field(field: Field, kind: str) -> Any:  # noqa: ANN401 - rosbags' nested tuples
-    """Return a field as rosbags describes it.
-
-    Args:
-        field: Which.
-        kind: Of number, or the name of its messages.
+    """Return a field as rosbags describes it; its kind is one of number, or its messages' name.
 
     Raises:
         LinkError: CDR cannot hold it.

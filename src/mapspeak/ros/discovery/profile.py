@@ -1,7 +1,10 @@
-"""The robot as we will use it: which topic is its map, which its pose, how it takes goals."""
+"""The robot as we will use it: which topic is its map, which its pose, how it takes goals.
 
-from dataclasses import dataclass
-from enum import StrEnum
+Its parts are found one by one: how good each is, and which of two finds is the better.
+"""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum, StrEnum
 
 from mapspeak.ros.discovery import ranking
 from mapspeak.ros.discovery.overrides import RobotOverrides
@@ -43,7 +46,6 @@ class RobotProfile:
 
     Attributes:
         radius_source: Who said so: a parameter, or robot.yaml; empty where it is assumed.
-        other_map_topics: Of the same type: costmaps, and maps of other robots.
         pose_topic: The topic, where it is not TF.
         pose_type: Its type, as "package/Type".
         tf_topics: /tf and /tf_static, or those of a namespace.
@@ -66,7 +68,6 @@ class RobotProfile:
     map_name: str = ""
     map_topic: str | None = None
     map_updates_topic: str | None = None
-    other_map_topics: tuple[str, ...] = ()
     map_frame: str = "map"
     base_frame: str = "base_link"
     pose_source: PoseSource = PoseSource.NONE
@@ -102,7 +103,7 @@ def choose_profile(
     """
     namespace, others = _choose_namespace(overrides, ranking.find_namespaces(graph, dead))
     near = ranking.Nearness(namespace, dead)
-    map_topic, updates_topic, other_maps = _choose_map(graph, overrides, near)
+    map_topic, updates_topic = _choose_map(graph, overrides, near)
     source, pose_topic, pose_type = _choose_pose(graph, overrides, near, frames)
     camera_topic, camera_type, info_topic = _choose_camera(graph, overrides, near)
     navigation, navigation_name = _choose_navigation(graph, overrides, near)
@@ -116,7 +117,6 @@ def choose_profile(
         map_name=overrides.map_name or "",
         map_topic=map_topic,
         map_updates_topic=updates_topic,
-        other_map_topics=other_maps,
         map_frame=(overrides.map_frame or _choose_frame(("map",), frames, near)).lstrip("/"),
         base_frame=(overrides.base_frame or _choose_frame(BASE_FRAMES, frames, near)).lstrip("/"),
         pose_source=source,
@@ -158,13 +158,10 @@ def _find_dead_action(graph: RosGraph, kind: NavigationKind, name: str | None) -
 
 def _choose_map(
     graph: RosGraph, overrides: RobotOverrides, near: ranking.Nearness
-) -> tuple[str | None, str | None, tuple[str, ...]]:
-    """Return the map's topic, that of its updates, and other topics of the same type."""
-    found = next(iter(ranking.rank_maps(graph, near)), None)
-    topic = overrides.map_topic or found
+) -> tuple[str | None, str | None]:
+    topic = overrides.map_topic or ranking.best(graph, ranking.MAPS, near)
     listed = f"{topic}_updates" if f"{topic}_updates" in graph.types else None
-    others = tuple(each for each in graph.topics_of(ranking.MAP) if each != topic)
-    return topic, overrides.map_updates_topic or listed, others
+    return topic, overrides.map_updates_topic or listed
 
 
 def _choose_pose(
@@ -276,3 +273,111 @@ def _choose_frame(names: tuple[str, ...], frames: frozenset[str], near: ranking.
 def _choose_tf_topics(graph: RosGraph, near: ranking.Nearness) -> tuple[str, str]:
     own = f"{near.namespace}/tf"
     return (own, f"{own}_static") if own in graph.types else ("/tf", "/tf_static")
+
+
+class Worth(IntEnum):
+    """How good a part is that was found, the worst first."""
+
+    MISSING = 0
+    NAMED = 1
+    SECOND_BEST = 2
+    FULL = 3
+
+
+class RobotPart(StrEnum):
+    """What belongs together in a profile, by the key with which robot.yaml names it."""
+
+    MAP = "map_topic"
+    POSE = "pose_topic"
+    CAMERA = "camera_topic"
+    LASER = "scan_topic"
+    NAVIGATION = "navigation"
+    VELOCITY = "velocity_topic"
+    RADIUS = "radius_m"
+
+    def topic(self, profile: RobotProfile) -> str | None:
+        """Return the topic, or the action, that shows whether it is alive."""
+        match self:
+            case RobotPart.POSE if profile.pose_source is PoseSource.TF:
+                return profile.tf_topics[0]
+            case RobotPart.NAVIGATION:
+                return end_of_goals(profile.navigation, profile.navigation_name)
+            case RobotPart.RADIUS:
+                return profile.radius_source or None
+        topic: str | None = getattr(profile, self)
+        return topic
+
+    def is_heard(self, profile: RobotProfile) -> bool:
+        """Return whether we publish that topic, and the robot listens."""
+        is_goal_topic = profile.navigation is NavigationKind.GOAL_TOPIC
+        return self is RobotPart.VELOCITY or (self is RobotPart.NAVIGATION and is_goal_topic)
+
+    def worth(self, profile: RobotProfile) -> Worth:
+        """Return how good it is."""
+        topic = self.topic(profile)
+        if topic is None:
+            return Worth.MISSING
+        if topic in profile.dead_topics:
+            return Worth.NAMED
+        is_other_pose = self is RobotPart.POSE and profile.pose_source is not PoseSource.TF
+        is_goal_topic = self is RobotPart.NAVIGATION and self.is_heard(profile)
+        return Worth.SECOND_BEST if is_other_pose or is_goal_topic else Worth.FULL
+
+    def is_alive(self, profile: RobotProfile) -> bool:
+        """Tell whether it is there, and not by name only."""
+        return self.worth(profile) > Worth.NAMED
+
+    def values(self, profile: RobotProfile) -> dict[str, object]:
+        """Return its fields."""
+        return {name: getattr(profile, name) for name in FIELDS[self]}
+
+
+FIELDS = {
+    RobotPart.MAP: ("map_topic", "map_updates_topic"),
+    RobotPart.POSE: (
+        *("pose_source", "pose_topic", "pose_type", "map_frame", "base_frame", "tf_topics"),
+        *("namespace", "other_namespaces", "name"),
+    ),
+    RobotPart.CAMERA: ("camera_topic", "camera_type", "camera_info_topic"),
+    RobotPart.LASER: ("scan_topic",),
+    RobotPart.NAVIGATION: ("navigation", "navigation_name", "planner_name"),
+    RobotPart.VELOCITY: ("velocity_topic", "velocity_type"),
+    RobotPart.RADIUS: ("radius_m", "radius_source"),
+}
+
+
+def find_missing(profile: RobotProfile) -> tuple[RobotPart, ...]:
+    """Return the parts of which better may be found."""
+    return tuple(part for part in RobotPart if part.worth(profile) is not Worth.FULL)
+
+
+def improve(
+    before: RobotProfile, now: RobotProfile, *, is_settled: bool, keeps_navigation: bool
+) -> RobotProfile:
+    """Return the better of two looks, part by part: what was found is not lost by a later look.
+
+    Args:
+        before: As the robot is used.
+        now: As it looks now.
+        is_settled: What is as good as before is used no more for another one.
+        keeps_navigation: A drive of ours runs over the navigation of before.
+    """
+    values: dict[str, object] = {}
+    dead: set[str] = set()
+    for part in RobotPart:
+        is_kept = keeps_navigation and part is RobotPart.NAVIGATION
+        source = before if is_kept or not _is_better(part, before, now, is_settled) else now
+        values |= part.values(source)
+        topic = part.topic(source)
+        if topic in source.dead_topics:
+            dead.add(topic)
+    # An unknown distribution or clock may be known by now.
+    values["distro"] = now.distro or before.distro
+    values["clock_topic"] = before.clock_topic or now.clock_topic
+    return replace(before, dead_topics=frozenset(dead), **values)  # type: ignore[arg-type]
+
+
+def _is_better(part: RobotPart, before: RobotProfile, now: RobotProfile, is_settled: bool) -> bool:  # noqa: FBT001
+    if part.worth(now) != part.worth(before):
+        return part.worth(now) > part.worth(before)
+    return not is_settled or part.topic(now) == part.topic(before)

@@ -1,5 +1,6 @@
 """Which of several topics of the right type is the one meant, judged by its name."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -9,7 +10,6 @@ MAP = "nav_msgs/OccupancyGrid"
 MAP_UPDATE = "map_msgs/OccupancyGridUpdate"
 MOVE_BASE_GOAL = "move_base_msgs/MoveBaseActionGoal"
 FRAMES = ("tf2_msgs/TFMessage", "tf/tfMessage")
-NO_MAPS = ("costmap", "cost_map")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +29,6 @@ class Nearness:
         listed = list(names)
         return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
 
-    def sort(self, names: list[str]) -> list[str]:
-        """Put names within the namespace first, and change nothing else."""
-        return sorted(names, key=lambda name: not self._is_near(name))
-
     def _is_near(self, name: str) -> bool:
         prefix = self.namespace.strip("/")
         return bool(prefix) and name.strip("/").startswith(f"{prefix}/")
@@ -44,7 +40,7 @@ class Wanted:
 
     Attributes:
         types: As "package/Type"; an earlier one is preferred where names are equally good.
-        endings: How such topics' names end, the usual one first.
+        endings: How such topics' names end, as patterns, the usual one first.
         never: Parts of names that mean something else.
         takes_others: Takes a topic of the type, however it is called.
     """
@@ -55,6 +51,12 @@ class Wanted:
     takes_others: bool = False
 
 
+MAPS = Wanted(
+    types=(MAP,),
+    endings=("/map", "map[^/]*"),
+    never=("costmap", "cost_map"),
+    takes_others=True,
+)
 SCANS = Wanted(
     types=("sensor_msgs/LaserScan",),
     endings=("/scan", "/base_scan", "scan"),
@@ -108,25 +110,6 @@ def best(graph: RosGraph, wanted: Wanted, near: Nearness) -> str | None:
     return near.first(ranked)
 
 
-def rank_maps(graph: RosGraph, near: Nearness) -> list[str]:
-    """Return the topics that may be the map, the best first; costmaps are none."""
-    maps = [
-        topic
-        for topic in graph.topics_of(MAP)
-        if not any(part in topic.lower() for part in NO_MAPS)
-    ]
-    maps.sort(
-        key=lambda topic: (
-            topic in near.dead,
-            not topic.endswith("/map"),
-            "map" not in topic.rpartition("/")[2],
-            topic.count("/"),
-            topic,
-        )
-    )
-    return near.sort(maps)
-
-
 def best_move_base(graph: RosGraph, near: Nearness) -> str | None:
     """Return the name of the ROS 1 action that drives to a pose, such as /move_base."""
     goals = graph.topics_of(MOVE_BASE_GOAL)
@@ -146,13 +129,12 @@ def find_namespaces(graph: RosGraph, dead: frozenset[str]) -> tuple[str, ...]:
 
 
 def _may_be(topic: str, wanted: Wanted) -> bool:
-    lowered = topic.lower()
-    if any(part in lowered for part in wanted.never):
+    if any(part in topic.lower() for part in wanted.never):
         return False
-    return wanted.takes_others or any(lowered.endswith(ending) for ending in wanted.endings)
+    return wanted.takes_others or _place_of(topic, wanted) < len(wanted.endings)
 
 
 def _place_of(topic: str, wanted: Wanted) -> int:
-    lowered = topic.lower()
-    places = (place for place, ending in enumerate(wanted.endings) if lowered.endswith(ending))
+    endings = enumerate(wanted.endings)
+    places = (place for place, ending in endings if re.search(f"{ending}$", topic.lower()))
     return next(places, len(wanted.endings))

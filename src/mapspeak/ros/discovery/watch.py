@@ -11,8 +11,13 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.ros.discovery import ranking
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.discovery.parts import PARTS, RADIUS, RobotPart, find_missing, improve
-from mapspeak.ros.discovery.profile import RobotProfile, choose_profile
+from mapspeak.ros.discovery.profile import (
+    RobotPart,
+    RobotProfile,
+    choose_profile,
+    find_missing,
+    improve,
+)
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosConnection, RosGraph
 from mapspeak.ros.transforms import FrameListener
@@ -31,12 +36,7 @@ class Liveness:
         self.dead: frozenset[str] = frozenset()
 
     async def ask(self, topic: str, *, is_heard: bool) -> None:
-        """Find out whether others publish a topic, or listen to it.
-
-        Args:
-            topic: Its full name.
-            is_heard: It is one that we publish, so that others are to listen.
-        """
+        """Find out whether others publish a topic, or listen to it where that is for us to do."""
         if topic in self._asked:
             return
         self._asked.add(topic)
@@ -80,14 +80,8 @@ async def find_radius_m(
     """Find the radius of the smallest circle around the robot, and which parameter says so.
 
     Navigation knows it as `footprint`, a polygon around the base, which counts where it is given,
-    or as `robot_radius`. None where neither is to be had.
-
-    Args:
-        connection: To the robot.
-        dialect: Which ROS: each keeps parameters in its own way.
-        namespace: Where the robot's nodes are.
-        services: Those that the robot lists; None where it does not. Nodes are known by them
-            before they are by name.
+    or as `robot_radius`. None where neither is to be had. Nodes are known by the services that
+    the robot lists before they are by name; None where it lists none.
     """
     for node, prefix in COSTMAPS[dialect]:
         full = f"{namespace}{node}"
@@ -174,14 +168,14 @@ async def _choose_alive(
     for _ in range(MOST_ROUNDS):
         before = liveness.dead
         profile = choose_profile(graph, overrides, frames=frames, dead=before, services=services)
-        for part in PARTS if graph.types else ():
+        for part in RobotPart if graph.types else ():
             topic = part.topic(profile)
-            if topic is not None and part is not RADIUS and topic not in graph.actions:
+            if topic is not None and part is not RobotPart.RADIUS and topic not in graph.actions:
                 await liveness.ask(topic, is_heard=part.is_heard(profile))
         if liveness.dead == before:
             break
     profile = choose_profile(graph, overrides, frames=frames, dead=liveness.dead, services=services)
-    used = {part.topic(profile) for part in PARTS}
+    used = {part.topic(profile) for part in RobotPart}
     return replace(profile, dead_topics=frozenset(profile.dead_topics & used))
 
 
@@ -340,7 +334,7 @@ class RobotWatch:
 
     def _is_said(self, part: RobotPart) -> bool:
         is_dead = part.topic(self.profile) in self.profile.dead_topics
-        return getattr(self._overrides, part.key) is not None and not is_dead
+        return getattr(self._overrides, part) is not None and not is_dead
 
     @property
     def _leads_to_base(self) -> bool:

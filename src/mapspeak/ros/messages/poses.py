@@ -24,12 +24,7 @@ NORM_TOLERANCE = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FramedPose:
-    """A pose with the frame it is given in.
-
-    Attributes:
-        pose: In the frame `frame_id`.
-        frame_id: Such as "map".
-    """
+    """A pose in the frame of that id."""
 
     pose: Pose
     frame_id: str
@@ -42,8 +37,6 @@ class FrameTransform:
 
     Attributes:
         parent_from_child: The pose of the child frame in the parent frame, seen from above.
-        parent: The outer frame, such as "map".
-        child: The inner frame, such as "odom".
         height_m: How far above the parent's origin the child's is.
         rotation: The whole rotation as a unit quaternion x, y, z, w; None where there is no more to
             it than the heading of the pose.
@@ -59,12 +52,7 @@ class FrameTransform:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Twist:
-    """A velocity in the robot's own frame.
-
-    Attributes:
-        left_mps: Across it.
-        turn_radps: Counter-clockwise.
-    """
+    """A velocity in the robot's own frame; it turns counter-clockwise."""
 
     forward_mps: float
     left_mps: float
@@ -74,16 +62,6 @@ class Twist:
     def is_standing(self) -> bool:
         """True when it commands a stand."""
         return self == Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
-
-
-def read_yaw(quaternion: Message) -> float:
-    """Read the heading of a quaternion, in radians.
-
-    Raises:
-        LinkError: It is zero, not of length 1, or not made of numbers.
-    """
-    x, y, z, w = _read_rotation(quaternion)
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def _read_rotation(quaternion: Message) -> tuple[float, float, float, float]:
@@ -99,41 +77,39 @@ def _read_rotation(quaternion: Message) -> tuple[float, float, float, float]:
     return x / norm, y / norm, z / norm, w / norm
 
 
-def write_yaw(yaw_rad: float) -> dict[str, float]:
-    """Write a heading as a quaternion."""
-    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
+def _yaw_of(rotation: tuple[float, float, float, float]) -> float:
+    x, y, z, w = rotation
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def read_pose(message: Message) -> Pose:
     """Read geometry_msgs/Pose; height and tilt are left away."""
     place = part_of(message, "position")
-    yaw_rad = read_yaw(part_of(message, "orientation"))
+    yaw_rad = _yaw_of(_read_rotation(part_of(message, "orientation")))
     return Pose(number_of(place, "x"), number_of(place, "y"), yaw_rad)
 
 
 def write_pose(pose: Pose) -> dict[str, Any]:
     """Write geometry_msgs/Pose, on the floor."""
     position = {"x": float(pose.x), "y": float(pose.y), "z": 0.0}
-    return {"position": position, "orientation": write_yaw(pose.yaw_rad)}
+    half_rad = pose.yaw_rad / 2
+    orientation = {"x": 0.0, "y": 0.0, "z": math.sin(half_rad), "w": math.cos(half_rad)}
+    return {"position": position, "orientation": orientation}
 
 
 def read_pose_stamped(message: Message) -> FramedPose:
-    """Read geometry_msgs/PoseStamped."""
+    """Read geometry_msgs/PoseStamped, PoseWithCovarianceStamped, or a nav_msgs/Odometry's pose."""
     frame_id, stamp_s = read_header(message)
-    return FramedPose(pose=read_pose(part_of(message, "pose")), frame_id=frame_id, stamp_s=stamp_s)
+    pose = part_of(message, "pose")
+    if "pose" in pose:
+        pose = part_of(pose, "pose")
+    return FramedPose(pose=read_pose(pose), frame_id=frame_id, stamp_s=stamp_s)
 
 
 def write_pose_stamped(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any]:
     """Write geometry_msgs/PoseStamped."""
     header = write_header(framed.frame_id, framed.stamp_s, dialect=dialect)
     return {"header": header, "pose": write_pose(framed.pose)}
-
-
-def read_pose_with_covariance(message: Message) -> FramedPose:
-    """Read geometry_msgs/PoseWithCovarianceStamped, or the pose of nav_msgs/Odometry."""
-    frame_id, stamp_s = read_header(message)
-    pose = read_pose(part_of(part_of(message, "pose"), "pose"))
-    return FramedPose(pose=pose, frame_id=frame_id, stamp_s=stamp_s)
 
 
 def write_pose_with_covariance(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any]:
@@ -185,10 +161,9 @@ def _read_transform(message: Any) -> FrameTransform:  # noqa: ANN401 - ROS JSON 
     parent, stamp_s = read_header(message)
     transform = part_of(message, "transform")
     place = part_of(transform, "translation")
-    yaw_rad = read_yaw(part_of(transform, "rotation"))
     rotation = _read_rotation(part_of(transform, "rotation"))
     return FrameTransform(
-        parent_from_child=Pose(number_of(place, "x"), number_of(place, "y"), yaw_rad),
+        parent_from_child=Pose(number_of(place, "x"), number_of(place, "y"), _yaw_of(rotation)),
         parent=parent,
         child=text_of(message, "child_frame_id").lstrip("/"),
         stamp_s=stamp_s,

@@ -1,4 +1,4 @@
-"""Laser scans and camera descriptions of ROS messages."""
+"""Laser scans of ROS messages, and what cameras say of their lenses."""
 
 import math
 import sys
@@ -68,22 +68,6 @@ class LaserScan:
         return np.isnan(self.ranges_m) if self.met_nothing is None else self.met_nothing
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CameraInfo:
-    """What a camera says of itself.
-
-    Attributes:
-        horizontal_fov_rad: From the left edge to the right one; None where it is not calibrated.
-        stamp_s: Robot time of the picture it belongs to.
-    """
-
-    width_px: int
-    height_px: int
-    horizontal_fov_rad: float | None
-    frame_id: str
-    stamp_s: float
-
-
 def read_scan(message: Message) -> LaserScan:
     """Read sensor_msgs/LaserScan; ranges outside its own limits become NaN.
 
@@ -151,30 +135,30 @@ def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
     }
 
 
-def read_camera_info(message: Message) -> CameraInfo:
-    """Read sensor_msgs/CameraInfo."""
-    frame_id, stamp_s = read_header(message)
+def read_fov_rad(message: Message) -> float | None:
+    """Read the horizontal field of view of a sensor_msgs/CameraInfo; None without calibration."""
+    read_header(message)
     width_px = whole_of(message, "width", low=0, high=LARGEST_SIDE_PX)
-    height_px = whole_of(message, "height", low=0, high=LARGEST_SIDE_PX)
     # ROS 1 writes the intrinsic matrix with a capital letter.
     matrix = floats_of(message, "K" if "K" in message else "k")
     if matrix.size != 9:
         raise misfit("k", f"{matrix.size} long", "a matrix of 9 numbers")
-    return CameraInfo(
-        width_px=width_px,
-        height_px=height_px,
-        horizontal_fov_rad=_fov(width_px, focal_px=float(matrix[0]), centre_px=float(matrix[2])),
-        frame_id=frame_id,
-        stamp_s=stamp_s,
-    )
+    return _fov(width_px, focal_px=float(matrix[0]), centre_px=float(matrix[2]))
 
 
-def write_camera_info(info: CameraInfo, *, dialect: Dialect) -> dict[str, Any]:
+def write_camera_info(
+    header: Message,
+    *,
+    width_px: int,
+    height_px: int,
+    horizontal_fov_rad: float | None,
+    dialect: Dialect,
+) -> dict[str, Any]:
     """Write sensor_msgs/CameraInfo of a camera without distortion, with square pixels."""
     focal_px = 0.0
-    if info.horizontal_fov_rad is not None:
-        focal_px = info.width_px / (2.0 * math.tan(info.horizontal_fov_rad / 2.0))
-    u, v = info.width_px / 2.0, info.height_px / 2.0
+    if horizontal_fov_rad is not None:
+        focal_px = width_px / (2.0 * math.tan(horizontal_fov_rad / 2.0))
+    u, v = width_px / 2.0, height_px / 2.0
     intrinsic = [focal_px, 0.0, u, 0.0, focal_px, v, 0.0, 0.0, 1.0]
     projection = [focal_px, 0.0, u, 0.0, 0.0, focal_px, v, 0.0, 0.0, 0.0, 1.0, 0.0]
     matrices = {
@@ -184,16 +168,15 @@ def write_camera_info(info: CameraInfo, *, dialect: Dialect) -> dict[str, Any]:
         "P": projection,
     }
     is_ros1 = dialect is Dialect.ROS1
-    roi = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
     return {
-        "header": write_header(info.frame_id, info.stamp_s, dialect=dialect),
-        "height": info.height_px,
-        "width": info.width_px,
+        "header": header,
+        "height": height_px,
+        "width": width_px,
         "distortion_model": "plumb_bob",
         **{name if is_ros1 else name.lower(): values for name, values in matrices.items()},
         "binning_x": 0,
         "binning_y": 0,
-        "roi": roi,
+        "roi": {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False},
     }
 
 

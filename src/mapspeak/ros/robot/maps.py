@@ -7,8 +7,7 @@ import anyio.to_thread
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.discovery.parts import MAP as MAP_PART
-from mapspeak.ros.discovery.profile import RobotProfile
+from mapspeak.ros.discovery.profile import RobotPart, RobotProfile
 from mapspeak.ros.discovery.ranking import MAP, MAP_UPDATE
 from mapspeak.ros.messages.fields import Message, read_stamp
 from mapspeak.ros.messages.grids import apply_grid_update, read_grid
@@ -53,7 +52,7 @@ class MapSubscriber:
         self._profile = profile
         is_bridged = connection.link.kind is LinkKind.ROSBRIDGE
         usual_s = ROSBRIDGE_WAITS_S if is_bridged else WAITS_S
-        self._waits_s = (waits_s or usual_s) if MAP_PART.is_alive(profile) else ()
+        self._waits_s = (waits_s or usual_s) if RobotPart.MAP.is_alive(profile) else ()
         self._in_vain_s = in_vain_s
         self._hint = MAP_HINT + (ROSBRIDGE_HINT if is_bridged else "")
         self._maps: Subscription | None = None
@@ -128,7 +127,7 @@ class MapSubscriber:
                 raise self._silence(maps) from None
 
     def _silence(self, maps: Subscription) -> LinkError:
-        nobody = "" if MAP_PART.is_alive(self._profile) else ": nobody publishes it"
+        nobody = "" if RobotPart.MAP.is_alive(self._profile) else ": nobody publishes it"
         return LinkError(
             f"No map has come on {maps.topic} yet{nobody}.",
             hint=f"{self._hint} We stay subscribed: ask again.",

@@ -8,13 +8,12 @@ from mapspeak.errors import LinkError
 from mapspeak.robot import StampedPose
 from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.profile import (
-    POSE_STAMPED,
     POSE_WITH_COVARIANCE,
     PoseSource,
     RobotProfile,
 )
 from mapspeak.ros.messages.fields import Message, read_stamp
-from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, read_pose_with_covariance
+from mapspeak.ros.messages.poses import read_pose_stamped
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.transforms import FrameListener
 
@@ -208,7 +207,7 @@ class PoseKeeper:
         return silent_s
 
     def _from_topic(self, topic: Subscription, message: Message) -> StampedPose:
-        framed = self._read(message)
+        framed = read_pose_stamped(message)
         outer = self._profile.map_frame
         is_on_map = framed.frame_id in ("", outer)
         if not is_on_map and self._frames.has_way(outer=outer, inner=framed.frame_id):
@@ -224,11 +223,6 @@ class PoseKeeper:
         # Odometry without a map has no other frame: it is taken for the map's.
         silent_s = self._measure_silence(topic.arrived_s, what="odometry")
         return StampedPose(framed.pose, framed.stamp_s, silent_s=silent_s, is_odometry=True)
-
-    def _read(self, message: Message) -> FramedPose:
-        if self._profile.pose_type == POSE_STAMPED:
-            return read_pose_stamped(message)
-        return read_pose_with_covariance(message)
 
     async def _wait_for_news(self) -> None:
         if self._topic is None:

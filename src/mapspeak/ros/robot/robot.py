@@ -18,21 +18,16 @@ from mapspeak.robot import (
 )
 from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.discovery.parts import (
-    CAMERA,
-    LASER,
-    MAP,
-    NAVIGATION,
-    POSE,
-    RADIUS,
-    VELOCITY,
-    RobotPart,
-)
-from mapspeak.ros.discovery.profile import NavigationKind, RobotProfile
+from mapspeak.ros.discovery.profile import NavigationKind, RobotPart, RobotProfile
 from mapspeak.ros.discovery.watch import FRAMES_S, RobotWatch
 from mapspeak.ros.port import RosConnection
-from mapspeak.ros.robot.driving import MOVE_BASE, NAV2, ActionDriver, GoalRecord
-from mapspeak.ros.robot.goaltopic import GoalTopicDriver
+from mapspeak.ros.robot.driving import (
+    MOVE_BASE,
+    NAV2,
+    ActionDriver,
+    GoalRecord,
+    GoalTopicDriver,
+)
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from mapspeak.ros.robot.sensors import Laser, RosCamera
@@ -65,8 +60,8 @@ class RosRobot:
         self._n_sending = 0
         profile = watch.profile
         self._maps = MapSubscriber(connection, profile)
-        self._camera = self._build_camera()
-        self._laser = self._build_laser()
+        self._camera = RosCamera(connection, profile)
+        self._laser = Laser(connection, profile, frames=frames, clock=clock)
         self._poses = PoseKeeper(connection, profile, frames)
         self._brake = self._build_brake()
         self._driver = self._build_driver()
@@ -85,8 +80,8 @@ class RosRobot:
             name=self.profile.name,
             radius_m=self.profile.radius_m,
             map_name=self.profile.map_name,
-            has_camera=CAMERA.is_alive(self.profile),
-            has_laser=LASER.is_alive(self.profile),
+            has_camera=RobotPart.CAMERA.is_alive(self.profile),
+            has_laser=RobotPart.LASER.is_alive(self.profile),
             detector=None,
             map_frame=self.profile.map_frame,
             is_radius_assumed=not self.profile.radius_source,
@@ -112,21 +107,21 @@ class RosRobot:
     async def fetch_map(self) -> OccupancyGrid:
         """Return the latest map; the same value as long as it has not changed."""
         await self.connection.wait_until_connected()
-        await self._watch.find(MAP)
+        await self._watch.find(RobotPart.MAP)
         # Where the robot fits on it depends on that.
-        await self._watch.wait_for(RADIUS)
+        await self._watch.wait_for(RobotPart.RADIUS)
         return await self._maps.fetch()
 
     async def fetch_pose(self) -> StampedPose:
         """Return where the robot believes it is; see the profile for how it is known."""
         await self.connection.wait_until_connected()
-        await self._watch.wait_for(POSE)
+        await self._watch.wait_for(RobotPart.POSE)
         return await self._find_pose()
 
     async def fetch_picture(self) -> CameraPicture:
         """Take a picture with the front camera."""
         await self.connection.wait_until_connected()
-        await self._watch.find(CAMERA)
+        await self._watch.find(RobotPart.CAMERA)
         picture = await self._camera.fetch()
         here = await self._find_pose()
         return CameraPicture(
@@ -151,7 +146,7 @@ class RosRobot:
     async def send_goal(self, goal: Pose) -> str:
         """Start a drive; return when navigation has taken or refused it."""
         await self.connection.wait_until_connected()
-        await self._watch.find(NAVIGATION)
+        await self._watch.find(RobotPart.NAVIGATION)
         # Whoever drives may have to stop before long.
         self.connection.advertise_early()
         self._n_sending += 1
@@ -174,7 +169,7 @@ class RosRobot:
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         """Return how goals stand that other clients have sent, as far as navigation tells."""
-        await self._watch.wait_for(NAVIGATION)
+        await self._watch.wait_for(RobotPart.NAVIGATION)
         return () if self._driver is None else await self._driver.fetch_foreign_goals()
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
@@ -220,33 +215,23 @@ class RosRobot:
         def is_new(part: RobotPart) -> bool:
             return part.values(before) != part.values(now)
 
-        if is_new(MAP):
+        if is_new(RobotPart.MAP):
             self._maps.close()
             self._maps = MapSubscriber(self.connection, now)
-        if is_new(CAMERA):
-            self._camera = self._build_camera()
-        if is_new(LASER) or is_new(POSE):
-            self._laser = self._build_laser()
-        if is_new(POSE):
+        if is_new(RobotPart.CAMERA):
+            self._camera = RosCamera(self.connection, now)
+        if is_new(RobotPart.LASER) or is_new(RobotPart.POSE):
+            self._laser = Laser(self.connection, now, frames=self._frames, clock=self._clock)
+        if is_new(RobotPart.POSE):
             self._poses.close()
             self._poses = PoseKeeper(self.connection, now, self._frames)
-        if is_new(VELOCITY):
+        if is_new(RobotPart.VELOCITY):
             self._brake = self._build_brake()
         is_elsewhere = now.map_frame != before.map_frame and not self._is_driving()
-        if is_new(NAVIGATION) or is_elsewhere:
+        if is_new(RobotPart.NAVIGATION) or is_elsewhere:
             self._driver = self._build_driver()
         if now.clock_topic != before.clock_topic:
             self.connection.start_soon(partial(self._clock.start, now.clock_topic))
-
-    def _build_camera(self) -> RosCamera:
-        camera = RosCamera(self.connection, self.profile)
-        self.connection.start_soon(camera.close_when_idle)
-        return camera
-
-    def _build_laser(self) -> Laser:
-        laser = Laser(self.connection, self.profile, frames=self._frames, clock=self._clock)
-        self.connection.start_soon(laser.close_when_idle)
-        return laser
 
     def _build_brake(self) -> Brake:
         return Brake(self.connection, self.profile, latest_pose=lambda: self._poses.latest)
@@ -310,11 +295,7 @@ async def build_ros_robot(
 ) -> RosRobot:
     """Return the robot at the other end of a connection, once it has said what it offers.
 
-    Args:
-        connection: To the robot; stays open as long as the robot is used.
-        overrides: What robot.yaml says.
-        patience: Time limits for what it offers, and of navigation.
-        frames_s: How long to wait for its frames, in wall time.
+    Its frames are waited for in wall time.
     """
     # Whether it is to be driven or only watched, whoever uses it says.
     connection.advertise_late()

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from mapspeak.errors import LinkError
 from mapspeak.robot import SCAN_PATIENCE_S, RangeScan
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.discovery.parts import CAMERA
-from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE, RobotProfile
+from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE, RobotPart, RobotProfile
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
 from mapspeak.ros.messages.poses import FrameTransform
-from mapspeak.ros.messages.scans import LaserScan, read_camera_info, read_scan
+from mapspeak.ros.messages.scans import LaserScan, read_fov_rad, read_scan
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from mapspeak.ros.transforms import FrameListener, TransformTree
@@ -48,6 +47,7 @@ class IdleSubscriptions:
         self._n_looking = 0
         self._looked_s = 0.0
         self._is_open = anyio.Event()
+        connection.start_soon(self._close_when_idle)
 
     @contextmanager
     def look(self) -> Generator[tuple[Subscription, ...]]:
@@ -63,19 +63,15 @@ class IdleSubscriptions:
             self._n_looking -= 1
             self._looked_s = anyio.current_time()
 
-    async def close_when_idle(self) -> None:
-        """End the subscriptions whenever nobody has looked for a while; run until cancelled."""
+    async def _close_when_idle(self) -> None:
         while True:
             await self._is_open.wait()
             await anyio.sleep_until(self._looked_s + LINGER_S)
             if self._n_looking == 0 and anyio.current_time() >= self._looked_s + LINGER_S:
-                self._close()
-
-    def _close(self) -> None:
-        for subscription in self.subscriptions:
-            self._connection.unsubscribe(subscription)
-        self.subscriptions = ()
-        self._is_open = anyio.Event()
+                for subscription in self.subscriptions:
+                    self._connection.unsubscribe(subscription)
+                self.subscriptions = ()
+                self._is_open = anyio.Event()
 
 
 PATIENCE_S, LONGEST_PATIENCE_S = 5.0, 30.0
@@ -105,7 +101,7 @@ class RosCamera:
         self._connection = connection
         self._profile = profile
         self._patience_s = patience_s
-        is_alive = CAMERA.is_alive(profile)
+        is_alive = RobotPart.CAMERA.is_alive(profile)
         self._next_patience_s = first_patience_s if is_alive else patience_s
         self._slowest_s = 0.0
         self._idle = IdleSubscriptions(connection, self._subscribe)
@@ -118,7 +114,8 @@ class RosCamera:
         """
         with self._idle.look() as (pictures, *_):
             message = await self._next_message(pictures)
-        return self._read(message)
+        is_compressed = self._profile.camera_type == COMPRESSED_IMAGE
+        return read_compressed_image(message) if is_compressed else read_image(message)
 
     async def fetch_fov_rad(self) -> float | None:
         """Return the horizontal field of view in radians; None where the camera does not say."""
@@ -127,13 +124,9 @@ class RosCamera:
             return None
         try:
             info = await infos[0].wait_for_more_than(0, timeout_s=INFO_PATIENCE_S)
-            return read_camera_info(info).horizontal_fov_rad
+            return read_fov_rad(info)
         except LinkError:
             return None
-
-    async def close_when_idle(self) -> None:
-        """End the subscription whenever nobody has looked for a while; run until cancelled."""
-        await self._idle.close_when_idle()
 
     def _subscribe(self) -> tuple[Subscription, ...]:
         """Begin with the pictures; the camera's measures follow where it tells them."""
@@ -160,11 +153,6 @@ class RosCamera:
         enough_s = max(self._patience_s, TIMES_SLOWEST * self._slowest_s)
         self._next_patience_s = min(enough_s, LONGEST_PATIENCE_S)
         return message
-
-    def _read(self, message: Message) -> EncodedPicture:
-        if self._profile.camera_type == COMPRESSED_IMAGE:
-            return read_compressed_image(message)
-        return read_image(message)
 
 
 MOST_TILT_RAD = math.radians(10.0)
@@ -257,10 +245,6 @@ class Laser:
             return self._read(message, poses)
         except LinkError:
             return None
-
-    async def close_when_idle(self) -> None:
-        """End the subscription whenever nobody has looked for a while; run until cancelled."""
-        await self._idle.close_when_idle()
 
     def _subscribe(self) -> tuple[Subscription, ...]:
         profile = self._profile
