@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import replace
 
@@ -106,15 +106,12 @@ def _radius_of_outline(outline: object) -> float | None:
             outline = json.loads(outline)
         except ValueError:
             return None
-    distances_m = list(_distances(outline))
-    return _plausible(max(distances_m)) if len(distances_m) > 2 else None
-
-
-def _distances(outline: object) -> Iterator[float]:
+    distances_m: list[float] = []
     for corner in outline if isinstance(outline, list) else []:
         match corner:
             case [int() | float() as x, int() | float() as y]:
-                yield math.hypot(x, y)
+                distances_m.append(math.hypot(x, y))
+    return _plausible(max(distances_m)) if len(distances_m) > 2 else None
 
 
 def _plausible(value: object) -> float | None:

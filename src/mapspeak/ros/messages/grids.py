@@ -49,8 +49,8 @@ def read_grid(message: Message) -> OccupancyGrid:
     )
 
 
-def write_grid(grid: OccupancyGrid, *, dialect: Dialect, frame_id: str = "map") -> dict[str, Any]:
-    """Write nav_msgs/OccupancyGrid; the cells as a flat numpy array of int8."""
+def write_grid(grid: OccupancyGrid, *, dialect: Dialect) -> dict[str, Any]:
+    """Write nav_msgs/OccupancyGrid in the frame map; the cells as a flat numpy array of int8."""
     info = {
         "map_load_time": write_stamp(grid.stamp_s, dialect=dialect),
         "resolution": float(np.float32(grid.resolution_m)),
@@ -58,7 +58,7 @@ def write_grid(grid: OccupancyGrid, *, dialect: Dialect, frame_id: str = "map") 
         "height": grid.n_rows,
         "origin": write_pose(grid.origin),
     }
-    header = write_header(frame_id, grid.stamp_s, dialect=dialect)
+    header = write_header("map", grid.stamp_s, dialect=dialect)
     return {"header": header, "info": info, "data": grid.cells.ravel()}
 
 

@@ -60,8 +60,6 @@ class MapSubscriber:
         self._n_waits = 0
         self._n_read = 0
         self._grid: OccupancyGrid | None = None
-        self.n_updates_refused = 0
-        """Updates that did not fit the map; the next whole map mends that."""
 
     async def fetch(self) -> OccupancyGrid:
         """Return the latest map; the same value until it changes.
@@ -155,7 +153,6 @@ class MapSubscriber:
     def _take_update(self, message: Message) -> None:
         if self._maps is None or self._maps.latest is None:
             return
-        try:
+        # What does not fit the map is left out; the next whole map mends that.
+        with suppress(MapspeakError):
             self._grid = apply_grid_update(self._read_latest(self._maps), message)
-        except MapspeakError:
-            self.n_updates_refused += 1

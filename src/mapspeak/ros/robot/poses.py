@@ -157,13 +157,13 @@ class PoseKeeper:
         if self._topic is not None:
             self._connection.unsubscribe(self._topic)
 
-    async def fetch(self, *, timeout_s: float = PATIENCE_S) -> StampedPose:
+    async def fetch(self) -> StampedPose:
         """Return the latest pose in the map frame; wait for the first.
 
         Raises:
             LinkError: The robot does not say where it is.
         """
-        with anyio.move_on_after(timeout_s):
+        with anyio.move_on_after(PATIENCE_S):
             while True:
                 try:
                     return self.latest
