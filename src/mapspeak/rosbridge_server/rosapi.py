@@ -2,13 +2,13 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages.fields import Dialect, bare_type, write_stamp
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Topic
-from mapspeak.rosbridge_server.interfaces import ROS2_DISTRIBUTION, RosSystem, Values
+from mapspeak.rosbridge_server.interfaces import ROS2_DISTRIBUTION, RosSystem, Service, Values
 from mapspeak.rosbridge_server.parameters import Parameters
 
 Answers = dict[str, Callable[[Values], Values]]
@@ -64,13 +64,9 @@ def _about_topics(system: RosSystem) -> Answers:
         ]
         return {**list_all(args), "typedefs_full_text": texts}
 
-    def list_of_type(args: Values) -> Values:
-        wanted = bare_type(_text(args, "type"))
-        return {"topics": [topic.name for topic in _shown(system) if topic.type == wanted]}
-
     return {
         "topics": list_all,
-        "topics_for_type": list_of_type,
+        "topics_for_type": lambda args: {"topics": _names_of_type(args, _shown(system))},
         "topics_and_raw_types": list_with_texts,
         "topic_type": lambda args: {
             "type": interfaces.said(topic.type) if (topic := find(args)) else ""
@@ -101,17 +97,8 @@ def _about_nodes_and_services(system: RosSystem) -> Answers:
             "services": [each.name for each in system.services if each.node == node],
         }
 
-    def list_of_type(args: Values) -> Values:
-        wanted = bare_type(_text(args, "type"))
-        return {"services": [each.name for each in system.services if each.type == wanted]}
-
-    def find_type(args: Values) -> Values:
-        service = system.find_service(_text(args, "service"))
-        return {"type": system.dialect.service_type_name(service.type) if service else ""}
-
-    def find_node(args: Values) -> Values:
-        service = system.find_service(_text(args, "service"))
-        return {"node": service.node if service else ""}
+    def find(args: Values) -> Service | None:
+        return system.find_service(_text(args, "service"))
 
     return {
         "nodes": list_nodes,
@@ -119,9 +106,11 @@ def _about_nodes_and_services(system: RosSystem) -> Answers:
         "services": lambda _: {
             "services": [each.name for each in system.services if HIDDEN not in each.name]
         },
-        "services_for_type": list_of_type,
-        "service_type": find_type,
-        "service_node": find_node,
+        "services_for_type": lambda args: {"services": _names_of_type(args, system.services)},
+        "service_type": lambda args: {
+            "type": system.dialect.service_type_name(found.type) if (found := find(args)) else ""
+        },
+        "service_node": lambda args: {"node": found.node if (found := find(args)) else ""},
         # On ROS 1 rosapi finds none, whatever there is.
         "action_servers": lambda _: {
             "action_servers": [
@@ -194,6 +183,11 @@ def _about_parameters(parameters: Parameters) -> Answers:
 
 def _shown(system: RosSystem) -> list[Topic]:
     return [topic for topic in system.hub.topics if HIDDEN not in topic.name]
+
+
+def _names_of_type(args: Values, known: Sequence[Topic | Service]) -> list[str]:
+    wanted = bare_type(_text(args, "type"))
+    return [each.name for each in known if each.type == wanted]
 
 
 def _text(args: Mapping[str, Any], name: str) -> str:

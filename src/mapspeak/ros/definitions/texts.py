@@ -104,7 +104,7 @@ def action_parts(action_type: str) -> dict[str, str]:
 DISTROS = ("kilted", "jazzy", "humble", "lyrical")
 """Of ROS 2, whose interfaces of Nav2 are known; the first stands for those that are not."""
 ENTRY = re.compile(r"^(?:MSG|SRV|ACTION): (?P<name>\S+)\n", re.MULTILINE)
-TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
+TIMES_OF_ROS1 = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
 DEFAULTS = {
     "geometry_msgs/Quaternion": ("float64 w", "float64 w 1"),
     "sensor_msgs/NavSatStatus": ("int8 status\n", "int8 status -2\n"),
@@ -162,7 +162,7 @@ def _entries(distro: str) -> Iterator[tuple[str, str]]:
 
 def _translate(name: str, text: str) -> str:
     """Return what ROS 1 says instead of ROS 2: its own times, and another name in rosapi."""
-    for ros2, ros1 in TIMES.items():
+    for ros2, ros1 in TIMES_OF_ROS1.items():
         text = text.replace(ros2, ros1)
     if name.startswith("rosapi/GetParam_"):
         text = text.replace("default_value", "default")
