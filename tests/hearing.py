@@ -1,9 +1,7 @@
 """A witness for tests of agents."""
 
-from typing import Any
-
-from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, Witness
-from mapspeak.evaluation.trials import ToolCall
+from mapspeak.evaluation.agent import OutOfBudgetError, Picture, ToolAnswer, Witness
+from mapspeak.evaluation.trials import ToolCall, Turn
 
 
 class Hearing(Witness):
@@ -19,24 +17,14 @@ class Hearing(Witness):
     def calls(self) -> list[str]:
         return [call.tool for call in self.made]
 
-    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        if len(self.made) >= self.most:
+    def hear(self, turn: Turn, pictures: tuple[Picture, ...] = ()) -> None:
+        if turn.role == "tool":
+            answer = ToolAnswer(text=turn.text, pictures=pictures, is_error=turn.is_error)
+            self.answers.append(answer)
+        elif turn.call is None:
+            assert turn.role == "agent"
+            self.words.append((turn.text, turn.n_picture_tokens))
+        elif len(self.made) >= self.most:
             raise OutOfBudgetError(f"More than {self.most} calls.", hint="Call less.")
-        self.made.append(ToolCall(tool=tool, arguments=arguments))
-
-    def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
-        del tool
-        self.answers.append(answer)
-
-    def hear_words(
-        self,
-        role: str,
-        text: str,
-        *,
-        n_input_tokens: int | None = None,
-        n_output_tokens: int | None = None,
-        n_picture_tokens: int | None = None,
-    ) -> None:
-        assert role == "agent"
-        self.words.append((text, n_picture_tokens))
-        del n_input_tokens, n_output_tokens
+        else:
+            self.made.append(turn.call)

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from mapspeak.cli.simulating import demo
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.reading import read_map_text
+from mapspeak.evaluation.agents.reading import read_map_text
 from mapspeak.evaluation.tasks.catalogue import FAMILIES
 from mapspeak.evaluation.trials import read_results
 from mapspeak.spatial.mapfiles import load_map
@@ -76,11 +76,12 @@ def test_what_was_seen_is_in_the_semantic_map(folder: Path) -> None:
     assert "fire extinguisher" in (folder / "semantic_map.yaml").read_text()
 
 
-def test_the_page_needs_nothing_from_elsewhere(folder: Path) -> None:
-    page = (folder / "report.html").read_text()
-    assert "data:image/png;base64," in page
-    assert 'src="http' not in page
-    assert 'href="http' not in page
+def test_the_pages_need_nothing_from_elsewhere(folder: Path) -> None:
+    replay = (folder_of(folder, "explore") / "replay.html").read_text()
+    assert "data:image/png;base64," in replay
+    for page in (replay, (folder / "report.html").read_text()):
+        assert 'src="http' not in page
+        assert 'href="http' not in page
 
 
 def test_every_picture_is_kept(folder: Path) -> None:

@@ -129,10 +129,11 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
 
 def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
     """Run the trials one after the other in this process, each with a server over stdio."""
+    from mapspeak.evaluation.agent import ServerAccess  # noqa: PLC0415
     from mapspeak.evaluation.runs.attempt import attempt  # noqa: PLC0415
     from mapspeak.evaluation.runs.plan import RunOptions, plan_run  # noqa: PLC0415
     from mapspeak.evaluation.runs.runner import make_jobs, writing_to  # noqa: PLC0415
-    from mapspeak.evaluation.trials import ServerAccess, trial_folder  # noqa: PLC0415
+    from mapspeak.evaluation.trials import trial_folder  # noqa: PLC0415
     from mapspeak.safety import Hold  # noqa: PLC0415
 
     options = RunOptions(worlds=(world,), n_trials=1, seed=seed, folder=folder)

@@ -12,11 +12,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.inspected.playing import InspectedSystem
 from mapspeak.geometry import Pose
 from mapspeak.simulator import WorldObject
@@ -57,11 +56,8 @@ class Trial:
     def id(self) -> str:
         """Return where it lies below the run's trials: the same in every run."""
         parts = (self.task, self.world, self.answerer, self.representation)
-        return "/".join((*map(_as_file_name, parts), f"{self.number:03d}"))
-
-
-def _as_file_name(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text).lstrip(".") or "_"
+        plain = (re.sub(r"[^A-Za-z0-9_.+-]+", "_", part).lstrip(".") or "_" for part in parts)
+        return "/".join((*plain, f"{self.number:03d}"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,16 +161,40 @@ class ToolCall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Turn:
+class TokenCounts:
+    """What a model has read and written; None where there was none, or nobody counted.
+
+    Attributes:
+        n_input_tokens: Read, cached ones included.
+        n_output_tokens: Written, thoughts included.
+        n_picture_tokens: What of the input pictures were.
+    """
+
+    n_input_tokens: int | None = None
+    n_output_tokens: int | None = None
+    n_picture_tokens: int | None = None
+
+    def plus(self, other: "TokenCounts") -> "TokenCounts":
+        """Return the sums; a count that neither has stays None."""
+        return TokenCounts(
+            n_input_tokens=_sum(self.n_input_tokens, other.n_input_tokens),
+            n_output_tokens=_sum(self.n_output_tokens, other.n_output_tokens),
+            n_picture_tokens=_sum(self.n_picture_tokens, other.n_picture_tokens),
+        )
+
+
+def _sum(one: int | None, other: int | None) -> int | None:
+    return None if one is None and other is None else (one or 0) + (other or 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turn(TokenCounts):
     """One piece of the conversation, for replay.
 
     Attributes:
         role: "system" or "user" (what it was told), "agent", or "tool" (an answer).
         call: The tool that the agent called, or that answers.
         is_error: The tool answered with an error.
-        n_input_tokens: What the model read for this turn; None where nobody counted.
-        n_output_tokens: What it wrote.
-        n_picture_tokens: What of the input its pictures were.
         wall_s: Since the trial began.
         robot_s: Robot time; None before the robot was there.
         pose: Where the robot truly stood, in a map without errors.
@@ -185,24 +205,19 @@ class Turn:
     call: ToolCall | None = None
     is_error: bool = False
     pictures: tuple[str, ...] = ()
-    n_input_tokens: int | None = None
-    n_output_tokens: int | None = None
-    n_picture_tokens: int | None = None
     wall_s: float = 0.0
     robot_s: float | None = None
     pose: Pose | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrialResult:
+class TrialResult(TokenCounts):
     """Everything that is kept of a trial, but for its turns, which lie beside it.
 
     Attributes:
         shortest_m: How far the robot had to drive; None where the task has no such way.
         n_decisions: Times that the agent chose what to do next: model turns, or calls of a script.
         n_errors: Tool calls that were answered with an error.
-        n_input_tokens: Read by a model; None where there was none, or nobody counted.
-        n_picture_tokens: What of the input pictures were.
         cpu_s: What this machine computed for it, on all cores together, in the trial's own process;
             a server or a client program that runs as another process is not in it.
         error: What broke the trial; None where nothing did.
@@ -219,86 +234,11 @@ class TrialResult:
     n_calls: int = 0
     n_decisions: int = 0
     n_errors: int = 0
-    n_input_tokens: int | None = None
-    n_output_tokens: int | None = None
-    n_picture_tokens: int | None = None
     robot_s: float = 0.0
     wall_s: float = 0.0
     cpu_s: float = 0.0
     n_collisions: int = 0
     error: str | None = None
-
-
-class ServerAccess(StrEnum):
-    """How an agent reaches the robot's server."""
-
-    MEMORY = "memory"
-    """In the trial's own process: for scripts, which need no pipe."""
-    STDIO = "stdio"
-    """Over stdio to `mapspeak serve` in a process of its own, as any client does."""
-    COMMAND = "command"
-    """The agent starts `Assignment.server` itself, through a program of its own; its `ToolClient`
-    has no client, and its calls are counted from the server's audit log."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Assignment:
-    """What an agent is given.
-
-    Attributes:
-        system: The server's instructions and the guidance of the task.
-        seed: Of anything it draws.
-        server: The command line of its server, for agents that start it themselves.
-        folder: The trial's; an agent may keep files of its own there.
-    """
-
-    prompt: str
-    system: str
-    limits: Limits
-    seed: int
-    server: tuple[str, ...]
-    folder: Path
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AgentEnd:
-    """How an agent ended.
-
-    Attributes:
-        state: finished, gave_up or out_of_budget.
-        n_decisions: Model turns; None counts the calls.
-        n_input_tokens: Read by the model; None where there was none.
-        n_picture_tokens: What of the input pictures were.
-    """
-
-    answer: str
-    state: TrialState = TrialState.FINISHED
-    n_decisions: int | None = None
-    n_input_tokens: int | None = None
-    n_output_tokens: int | None = None
-    n_picture_tokens: int | None = None
-
-
-class Agent(Protocol):
-    """Carries out an assignment by calling tools."""
-
-    @property
-    def name(self) -> str:
-        """Return its name, as in `Trial.agent`."""
-        ...
-
-    @property
-    def connection(self) -> ServerAccess:
-        """Say how it reaches the server."""
-        ...
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment.
-
-        Raises:
-            OutOfBudgetError: A call would have gone beyond the limits; let it pass through.
-        """
-        ...
 
 
 _RESULT: TypeAdapter[TrialResult] = TypeAdapter(TrialResult)

@@ -9,12 +9,12 @@ import pytest
 import clientprogram
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
+from mapspeak.evaluation.agent import Assignment, ToolClient
 from mapspeak.evaluation.agents.command.agent import CommandAgent
-from mapspeak.evaluation.agents.command.program import AnswerForm, Program, Start, find_program
+from mapspeak.evaluation.agents.command.program import AnswerForm, Program, find_program
 from mapspeak.evaluation.agents.finding import find_versions
 from mapspeak.evaluation.agents.models.chat import Thinking
-from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.trials import Assignment, Limits, TrialState
+from mapspeak.evaluation.trials import Limits, TrialState
 
 pytestmark = pytest.mark.anyio
 
@@ -131,25 +131,27 @@ def processes_with(word: str) -> list[str]:
 
 
 def test_the_known_programs_are_told_of_the_server_and_the_prompt(tmp_path: Path) -> None:
-    start = Start(
-        prompt="Go {answer} there.", server=("serve", "--seed", "1"), folder=tmp_path, thinking=None
-    )
+    server, prompt = ("serve", "--seed", "1"), "Go {answer} there."
     for name in ("claude-code", "codex", "gemini"):
         program = find_program(name)
-        command = start.command(program)
-        start.write_config(program)
-        assert "Go {answer} there." in command
+        command = program.command_line(prompt=prompt, server=server, folder=tmp_path, thinking=None)
+        program.write_config(server, tmp_path)
+        assert prompt in command
         entry = json.loads((tmp_path / program.config).read_text())["mcpServers"]["robot"]
         assert (entry["command"], entry["args"]) == ("serve", ["--seed", "1"])
-    assert 'mcp_servers.robot.args=["--seed", "1"]' in start.command(find_program("codex"))
+        if name == "codex":
+            assert 'mcp_servers.robot.args=["--seed", "1"]' in command
 
 
 def test_how_much_to_think_is_said_only_when_asked(tmp_path: Path) -> None:
-    program = find_program("codex")
-    plain = Start(prompt="Go.", server=("serve",), folder=tmp_path, thinking=None)
-    asked = Start(prompt="Go.", server=("serve",), folder=tmp_path, thinking=Thinking.LOW)
-    assert "effort" not in " ".join(plain.command(program))
-    assert 'model_reasoning_effort="low"' in asked.command(program)
+    plain, asked = (
+        find_program("codex").command_line(
+            prompt="Go.", server=("serve",), folder=tmp_path, thinking=thinking
+        )
+        for thinking in (None, Thinking.LOW)
+    )
+    assert "effort" not in " ".join(plain)
+    assert 'model_reasoning_effort="low"' in asked
     with pytest.raises(ConfigError, match="how much to think"):
         CLIENT.check(Thinking.LOW)
 

@@ -9,17 +9,24 @@ from PIL import Image
 from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agent import (
+    AgentEnd,
+    Assignment,
+    Picture,
+    ToolAnswer,
+    ToolClient,
+    Witness,
+)
 from mapspeak.evaluation.agents.finding import check_agent, find_agent
 from mapspeak.evaluation.agents.models.chat import (
-    Ending,
-    MockModel,
+    ModelAgent,
     ModelConversation,
     Reply,
     ToolCallRequest,
+    estimate_picture_tokens,
 )
-from mapspeak.evaluation.agents.models.loop import ModelAgent, estimate_picture_tokens
-from mapspeak.evaluation.client import Picture, ToolAnswer, ToolClient, Witness
-from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
+from mapspeak.evaluation.agents.models.mock import MockModel
+from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.server.mapview.representations import Representation
 from served import connect
 
@@ -52,10 +59,8 @@ class Scripted:
         self.replies = list(replies)
         self.heard: list[tuple[ToolCallRequest, ToolAnswer]] = []
 
-    def begin(
-        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
-    ) -> ModelConversation:
-        assert (system, prompt, seed) == ("Be quick.", "Go there.", 0)
+    def begin(self, task: Assignment, tools: Sequence[Tool]) -> ModelConversation:
+        assert (task.system, task.prompt, task.seed) == ("Be quick.", "Go there.", 0)
         assert "look_at_map" in {tool.name for tool in tools}
         return self
 
@@ -66,7 +71,7 @@ class Scripted:
         self.heard.append((call, answer))
 
 
-LOOK = ToolCallRequest(id="1", tool="look_at_map")
+LOOK = ToolCallRequest(id="1", tool="look_at_map", arguments={})
 
 
 @pytest.mark.parametrize("representation", Representation)
@@ -74,7 +79,7 @@ async def test_the_mock_model_comes_to_an_end_however_the_map_is_shown(
     tmp_path: Path, representation: Representation
 ) -> None:
     witness = Hearing()
-    agent = ModelAgent(MockModel(), "mock")
+    agent = ModelAgent(MockModel, "mock")
     end, _ = await run(agent, assignment(tmp_path), witness, representation)
     assert (end.state, end.answer) == (TrialState.FINISHED, "ANSWER: there")
     assert witness.calls[:3] == ["look_at_map", "look_through_camera", "describe_place"]
@@ -86,7 +91,7 @@ async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None
     async def calls_with(seed: int) -> list[tuple[str, str]]:
         task = assignment(tmp_path, seed=seed)
         ledger = Hearing()
-        await run(ModelAgent(MockModel(), "mock"), task, ledger)
+        await run(ModelAgent(MockModel, "mock"), task, ledger)
         return [(call.tool, str(call.arguments)) for call in ledger.made]
 
     assert await calls_with(1) == await calls_with(1)
@@ -102,7 +107,7 @@ async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
         Reply(text="Done.", n_input_tokens=3000, n_output_tokens=2),
     )
     witness = Hearing()
-    end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), witness)
+    end, _ = await run(ModelAgent(model.begin, "x/y"), assignment(tmp_path), witness)
     one = estimate_picture_tokens(witness.answers[0].pictures[0])
     assert (end.n_input_tokens, end.n_output_tokens, end.n_picture_tokens) == (4600, 12, 3 * one)
     counted = [n_tokens for _, n_tokens in witness.words]
@@ -112,7 +117,7 @@ async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
 
 async def test_an_api_that_does_not_count_leaves_tokens_unknown(tmp_path: Path) -> None:
     end, _ = await run(
-        ModelAgent(Scripted(Reply(text="Done.")), "x/y"), assignment(tmp_path), Hearing()
+        ModelAgent(Scripted(Reply(text="Done.")).begin, "x/y"), assignment(tmp_path), Hearing()
     )
     assert (end.n_input_tokens, end.n_output_tokens) == (None, None)
 
@@ -120,10 +125,12 @@ async def test_an_api_that_does_not_count_leaves_tokens_unknown(tmp_path: Path) 
 async def test_errors_reach_the_model_as_errors_and_it_may_go_on(tmp_path: Path) -> None:
     wrong = ToolCallRequest(id="1", tool="describe_place", arguments={"place": "R99"})
     unknown = ToolCallRequest(id="2", tool="fly", arguments={"tool": "wings", "self": 1})
-    garbled = ToolCallRequest(id="3", tool="measure", mistake="The arguments are no JSON.")
+    garbled = ToolCallRequest(
+        id="3", tool="measure", arguments={}, mistake="The arguments are no JSON."
+    )
     model = Scripted(Reply(text="", calls=(wrong, unknown, garbled)), Reply(text="Done."))
     witness = Hearing()
-    end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), witness)
+    end, _ = await run(ModelAgent(model.begin, "x/y"), assignment(tmp_path), witness)
     assert end.state is TrialState.FINISHED
     assert [call for call, _ in model.heard] == [wrong, unknown, garbled]
     assert [answer.is_error for _, answer in model.heard] == [True, True, True]
@@ -134,31 +141,33 @@ async def test_out_of_budget_it_still_says_what_it_has_cost(tmp_path: Path) -> N
     looking = [
         Reply(text="", calls=(LOOK,), n_input_tokens=10, n_output_tokens=1) for _ in range(3)
     ]
-    end, _ = await run(ModelAgent(Scripted(*looking), "x/y"), assignment(tmp_path), Hearing(most=2))
+    end, _ = await run(
+        ModelAgent(Scripted(*looking).begin, "x/y"), assignment(tmp_path), Hearing(most=2)
+    )
     assert end.state is TrialState.OUT_OF_BUDGET
     assert (end.n_decisions, end.n_input_tokens) == (3, 30)
 
 
 @pytest.mark.parametrize(
-    ("ending", "said", "state", "answer"),
+    ("said", "state", "answer"),
     [
-        (Ending.REFUSED, "", TrialState.GAVE_UP, "The model refused to answer."),
-        (Ending.REFUSED, "I will not.", TrialState.GAVE_UP, "I will not."),
-        (Ending.CUT_OFF, "The room", TrialState.OUT_OF_BUDGET, "The room"),
+        ("", TrialState.GAVE_UP, "The model refused to answer."),
+        ("I will not.", TrialState.GAVE_UP, "I will not."),
+        ("The room", TrialState.OUT_OF_BUDGET, "The room"),
     ],
 )
 async def test_a_model_that_did_not_end_by_itself_has_not_finished(
-    tmp_path: Path, ending: Ending, said: str, state: TrialState, answer: str
+    tmp_path: Path, said: str, state: TrialState, answer: str
 ) -> None:
-    model = Scripted(Reply(text=said, ending=ending))
-    end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), Hearing())
+    model = Scripted(Reply(text=said, state=state))
+    end, _ = await run(ModelAgent(model.begin, "x/y"), assignment(tmp_path), Hearing())
     assert (end.state, end.answer) == (state, answer)
 
 
 async def test_a_call_that_came_before_the_cut_is_made(tmp_path: Path) -> None:
-    cut = Reply(text="", calls=(LOOK,), ending=Ending.CUT_OFF)
+    cut = Reply(text="", calls=(LOOK,), state=TrialState.OUT_OF_BUDGET)
     witness = Hearing()
-    agent = ModelAgent(Scripted(cut, Reply(text="Done.")), "x/y")
+    agent = ModelAgent(Scripted(cut, Reply(text="Done.")).begin, "x/y")
     end, _ = await run(agent, assignment(tmp_path), witness)
     assert (end.state, witness.calls) == (TrialState.FINISHED, ["look_at_map"])
 

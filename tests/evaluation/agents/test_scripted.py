@@ -5,9 +5,9 @@ import pytest
 from drawing import grid_from_text
 from fakes import FakeRobot
 from hearing import Hearing
-from mapspeak.evaluation.agents.scripted import ScriptedAgent
-from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
+from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient
+from mapspeak.evaluation.agents.scripted import follow_script
+from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.geometry import Pose
 from served import connect
 
@@ -29,7 +29,7 @@ async def run(folder: Path, *tools: str) -> tuple[AgentEnd, Hearing]:
     task = Assignment(prompt=PROMPT, system="", limits=Limits(), seed=0, server=(), folder=folder)
     async with connect(robot, folder, tools=tools) as client:
         ledger = Hearing()
-        return await ScriptedAgent().run(task, ToolClient(client, ledger)), ledger
+        return await follow_script(task, ToolClient(client, ledger)), ledger
 
 
 async def test_a_search_is_not_begun_where_none_is_offered(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 from importlib import resources
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import pytest
@@ -13,6 +14,7 @@ from mapspeak.evaluation.trials import (
     TrialState,
     Turn,
     read_results,
+    trial_folder,
     write_result,
 )
 from reportmaking import (
@@ -30,9 +32,15 @@ HOSTILE = (
 )
 
 
-def page_of(run: Path, **limits: int) -> ReadPage:
-    """Writes the page of a run and reads its page."""
-    return ReadPage.of(write_page(run, read_results(run), **limits))
+def page_of(run: Path) -> ReadPage:
+    """Writes the pages of a run and reads the one of the run."""
+    return ReadPage.of(write_page(run, read_results(run)))
+
+
+def replay_of(run: Path, number: int = 1, **changes: object) -> ReadPage:
+    """Writes the pages of a run and reads that of a trial."""
+    page_of(run)
+    return ReadPage.of(trial_folder(run, make_trial(number, **changes)) / "replay.html")
 
 
 @pytest.fixture
@@ -47,49 +55,50 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_every_id_is_there_once_and_every_reference_finds_one(run: Path) -> None:
-    page = page_of(run)
-    ids = page.values("id")
-    wanted = [value for value in page.values("href", "for") if value.startswith("#")]
-    assert page.is_whole
+    replay = replay_of(run, 2)
+    ids = replay.values("id")
+    wanted = [value for value in replay.values("href", "for") if value.startswith("#")]
+    assert replay.is_whole
     assert len(ids) == len(set(ids))
     assert {unquote(value.removeprefix("#")) for value in wanted} <= set(ids)
-    assert f"{make_trial(2).id}/step-4" in ids
+    assert "step-4" in ids
 
 
-def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
-    page = page_of(run)
-    references = page.values("href", "src", "data", "poster", "action", "srcset")
-    assert references
-    assert all(value.startswith(("#", "data:image/png;base64,")) for value in references)
-    (policy,) = [v for v in page.values("content") if "default-src" in v]
-    assert "default-src 'none'; img-src data:;" in policy
-    (style,) = page.all("style")
-    assert "url(" not in style.text
-    assert "@import" not in style.text
-    assert {each.tag for each in page.elements} & {"link", "iframe", "object", "base"} == set()
+def test_the_pages_need_nothing_from_elsewhere(run: Path) -> None:
+    for page in (page_of(run), replay_of(run)):
+        references = page.values("href", "src", "data", "poster", "action", "srcset")
+        assert references
+        assert not any("//" in value or value.startswith("/") for value in references)
+        (policy,) = [v for v in page.values("content") if "default-src" in v]
+        assert "default-src 'none'; img-src data: 'self' file:;" in policy
+        (style,) = page.all("style")
+        assert "url(" not in style.text
+        assert "@import" not in style.text
+        assert {each.tag for each in page.elements} & {"link", "iframe", "object", "base"} == set()
 
 
 def test_hostile_text_is_shown_as_text(tmp_path: Path) -> None:
-    trial = make_trial(1, world=f"flat {HOSTILE}", agent=HOSTILE)
+    names: dict[str, Any] = {"world": f"flat {HOSTILE}", "agent": HOSTILE}
+    trial = make_trial(1, **names)
     call = ToolCall(tool=HOSTILE, arguments={HOSTILE: HOSTILE})
     turns = (Turn(role=HOSTILE, text=HOSTILE, call=call, pictures=(HOSTILE,), is_error=True),)
     write_course(tmp_path, trial, *turns)
     result = make_result(trial, prompt=HOSTILE, answer=HOSTILE, error=HOSTILE)
     write_result(tmp_path, result)
-    page = page_of(tmp_path)
-    (script,) = page.all("script")
     own = resources.files("mapspeak.evaluation.report") / "replay.js"
-    assert script.text == own.read_text("utf-8")
-    assert page.all("img") == []
-    assert page.text.count(HOSTILE) >= 8
-    handlers = {name for each in page.elements for name in each.attributes if name[:2] == "on"}
-    assert handlers == set()
+    for page, n_times in ((page_of(tmp_path), 2), (replay_of(tmp_path, **names), 8)):
+        (script,) = page.all("script")
+        assert script.text == own.read_text("utf-8")
+        assert page.all("img") == []
+        assert page.text.count(HOSTILE) >= n_times
+        handlers = {name for each in page.elements for name in each.attributes if name[:2] == "on"}
+        assert handlers == set()
 
 
 def test_what_nobody_can_see_in_a_text_is_spelled_out(tmp_path: Path) -> None:
     trial = make_trial(1)
     write_trial(tmp_path, trial, answer="room \u202egnorw\x00")
-    text = page_of(tmp_path).text
+    text = replay_of(tmp_path).text
     assert "room <U+202E>gnorw<U+0000>" in text
     assert "\u202e" not in text
 
@@ -108,46 +117,35 @@ def test_a_script_beside_the_papers_models_is_called_one(run: Path) -> None:
 
 
 def test_a_replay_shows_where_the_robot_stood_at_every_step(run: Path) -> None:
-    page = page_of(run)
-    steps = {each.attributes.get("id"): each for each in page.all("li")}
-    first, last = (steps[f"{make_trial(1).id}/step-{number}"].attributes for number in (1, 4))
+    steps = {each.attributes.get("id"): each for each in replay_of(run).all("li")}
+    first, last = (steps[f"step-{number}"].attributes for number in (1, 4))
     # The map is 8 m by 4 m at a pixel per metre, and its picture counts v from the top.
     assert (first["data-u"], first["data-v"], first["data-driven"]) == ("1.0", "2.5", "0.0")
     assert (last["data-u"], last["data-v"], last["data-driven"]) == ("5.0", "2.5", "1.0")
 
 
 def test_a_replay_tells_every_call_and_answer_in_its_order(run: Path) -> None:
-    page = page_of(run)
-    (replay, *_) = page.all("details", "trial")
+    replay = replay_of(run)
     told = ["Go to the smallest room.", 'look_at_map{"layers": ["rooms"]}', "Explored: 6.0 m2"]
     places = [replay.text.index(each) for each in (*told, "I go there.")]
     assert places == sorted(places)
 
 
 def test_nothing_of_a_replay_is_hidden_from_those_without_scripts(run: Path) -> None:
-    page = page_of(run)
+    page = replay_of(run)
     assert not any("hidden" in each.attributes for each in page.elements)
     assert page.all("button") == [], "the script makes its own"
 
 
-def test_a_picture_seen_twice_is_in_the_page_once(run: Path) -> None:
-    page = page_of(run)
-    seen = page.all("svg", "seen")
-    images = page.all("image")
-    assert len(seen) == 2
-    assert len(images) == 2, "that picture, and the map of both"
-
-
-def test_replays_are_pages_of_their_own_when_they_are_too_long(run: Path) -> None:
-    page = page_of(run, page_limit_bytes=10)
-    assert page.all("details", "trial") == []
-    links = [unquote(v) for v in page.values("href") if v.endswith(".html")]
+def test_every_trial_is_replayed_on_a_page_beside_its_pictures(run: Path) -> None:
+    links = [unquote(v) for v in page_of(run).values("href") if v.endswith(".html")]
     assert len(links) == 2
     for link in links:
         replay = ReadPage.of(run / link)
         (back,) = [value for value in replay.values("href") if value.endswith("report.html")]
         assert ((run / link).parent / back).resolve() == (run / "report.html").resolve()
-        assert all((run / link).parent.joinpath(src).is_file() for src in replay.values("src"))
+        assert replay.values("src") == ["pictures/003.png"]
+        assert (run / link).parent.joinpath("pictures/003.png").is_file()
 
 
 def test_a_broken_conversation_is_told_and_the_rest_is_shown(run: Path) -> None:
@@ -155,7 +153,7 @@ def test_a_broken_conversation_is_told_and_the_rest_is_shown(run: Path) -> None:
     (folder / "turns.jsonl").write_text('{"role": 7}\n')
     (folder / "state.jsonl").write_text("no json\n")
     (folder / "map.pgm").write_text("no map")
-    (replay, *_) = page_of(run).all("details", "trial")
+    replay = replay_of(run)
     for name in ("turns.jsonl", "state.jsonl", "map.yaml"):
         assert f"{name} cannot be read" in replay.text
     assert "It stands in the toilet." in replay.text
@@ -166,16 +164,9 @@ def test_a_picture_elsewhere_is_not_looked_at(run: Path) -> None:
     write_picture(run, "secret.png", shade=200)
     turns = (Turn(role="tool", pictures=("../../../../../../pictures/secret.png", "..")),)
     write_course(run, trial, *turns)
-    (replay, *_) = page_of(run).all("details", "trial")
+    replay = replay_of(run)
     assert "secret.png is missing" in replay.text
     assert "The picture .. is missing" in replay.text
-
-
-def test_a_file_that_is_no_picture_is_not_shown_as_one(run: Path) -> None:
-    folder = run / "trials" / make_trial(1).id
-    (folder / "pictures" / "003.png").write_text("<svg onload='alert(1)'/>")
-    (replay, *_) = page_of(run).all("details", "trial")
-    assert "003.png is no picture." in replay.text
 
 
 def test_a_broken_trial_says_in_the_list_what_broke_it(tmp_path: Path) -> None:

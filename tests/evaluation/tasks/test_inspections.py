@@ -5,14 +5,14 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.evaluation.agents.baselines import RandomAgent
-from mapspeak.evaluation.agents.scripted import ScriptedAgent
-from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.agent import Assignment, ServerAccess, ToolClient
+from mapspeak.evaluation.agents.baselines import answer_at_random
+from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.runs.workplace import open_inspection
 from mapspeak.evaluation.scores.answers import Evidence
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
-from mapspeak.evaluation.trials import Assignment, Score, ServerAccess, Setting
+from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.ros.messages.fields import Dialect
 from sites import make_flat
 
@@ -56,7 +56,7 @@ async def ask(site: GroundTruth, task: str, seed: int, folder: Path) -> Score:
     async with open_inspection(
         setting.inspected, ServerAccess.MEMORY, toolsets=("ros",), folder=folder
     ) as opened:
-        end = await ScriptedAgent().run(assign(setting, seed, folder), ToolClient(opened.client))
+        end = await follow_script(assign(setting, seed, folder), ToolClient(opened.client))
     return judge(site, task, setting, end.answer)
 
 
@@ -135,7 +135,7 @@ async def test_the_scripted_policy_finds_every_answer_over_the_wire(
 async def test_chance_answers_nothing(site: GroundTruth, tmp_path: Path, task: str) -> None:
     for seed in range(5):
         setting = set_up(site, task, seed)
-        end = await RandomAgent().run(assign(setting, seed, tmp_path), ToolClient(None))
+        end = await answer_at_random(assign(setting, seed, tmp_path), ToolClient(None))
         assert not judge(site, task, setting, end.answer).is_success, end.answer
 
 

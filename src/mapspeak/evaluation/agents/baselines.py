@@ -1,82 +1,76 @@
-"""The best and the worst to compare with: an oracle that knows the truth, and a random agent."""
+"""To compare with: an oracle that knows the truth, chance, and two plain explorers."""
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import cv2
 import numpy as np
 
-from mapspeak.evaluation.agents.scripted import ScriptedAgent
-from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.driver import ARRIVED, ToolDriver
+from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient, gave_up
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label
+from mapspeak.evaluation.agents.exploring import (
+    MARGIN_M,
+    SIGHT_M,
+    point_of_largest,
+    ways_to_floor_m,
+)
+from mapspeak.evaluation.agents.reading import read_map_picture
+from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, ServerAccess, Setting
+from mapspeak.evaluation.trials import Setting
 from mapspeak.geometry import Point, Pose
-from mapspeak.spatial import Cell
-from mapspeak.spatial.grid import Mask
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import clearance_m
 
+# --- the oracle, and chance ----------------------------------------------------------------------
+
 BESIDE_M = 3.0
-MOST_GOALS = 6
+MOST_STANDS = 6
 
 
-@dataclass(frozen=True, slots=True)
-class OracleAgent:
-    """Drives to where truth says, and answers what truth says; explores as the script does."""
+async def answer_by_truth(
+    setting: Setting, site: GroundTruth, task: Assignment, tools: ToolClient
+) -> AgentEnd:
+    """Drive to where truth says, and answer what truth says; explore as the script does."""
+    truth, driver = setting.truth, ToolDriver(tools)
+    known = _known_answer(truth)
+    if known is not None:
+        return AgentEnd(answer=f"ANSWER: {known}")
+    if not setting.is_known or not truth:
+        return await follow_script(task, tools)
+    for goals in _stops(truth, site):
+        if not await _drive_to_one(driver, goals):
+            return AgentEnd(answer="The robot cannot get there.")
+    return AgentEnd(answer="ANSWER: there")
 
-    setting: Setting
-    site: GroundTruth
-    name: str = "oracle"
-    connection: ServerAccess = ServerAccess.MEMORY
 
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment."""
-        truth, driver = self.setting.truth, ToolDriver(tools)
-        known = _known_answer(truth)
-        if known is not None:
-            return AgentEnd(answer=f"ANSWER: {known}")
-        if not self.setting.is_known or not truth:
-            script: Agent = ScriptedAgent()
-            return await script.run(task, tools)
-        for goals in self._stops():
-            if not await _drive_to_one(driver, goals):
-                return AgentEnd(answer="The robot cannot get there.")
-        return AgentEnd(answer="ANSWER: there")
+def _stops(truth: Mapping[str, Any], site: GroundTruth) -> list[list[Pose]]:
+    """Return poses for each stop that are right, the roomiest first."""
+    if "goal" in truth:
+        goal = Point(*truth["goal"])
+        return [[Pose(goal.x, goal.y), *_roomiest(site, site.near(goal, 0.3))]]
+    if "rooms" in truth or "room" in truth:
+        names = truth.get("rooms") or [truth["room"]]
+        cells = [site.cells_of(site.room_named(name)) for name in names]
+        return [_roomiest(site, np.logical_or.reduce(cells))]
+    return [_beside(site, kind) for kind in truth.get("kinds") or [truth["kind"]]]
 
-    def _stops(self) -> list[list[Pose]]:
-        """Return poses for each stop that are right, the roomiest first."""
-        truth, site = self.setting.truth, self.site
-        if "goal" in truth:
-            goal = Point(*truth["goal"])
-            return [[Pose(goal.x, goal.y), *self._roomiest(site.near(goal, 0.3))]]
-        if "rooms" in truth or "room" in truth:
-            names = truth.get("rooms") or [truth["room"]]
-            cells = [site.cells_of(site.room_named(name)) for name in names]
-            return [self._roomiest(np.logical_or.reduce(cells))]
-        return [self._beside(kind) for kind in truth.get("kinds") or [truth["kind"]]]
 
-    def _beside(self, kind: str) -> list[Pose]:
-        poses: list[Pose] = []
-        for thing in self.site.things(kind):
-            place = self.site.place_of(thing)
-            poses += [
-                Pose(pose.x, pose.y, pose.point.bearing_to(place))
-                for pose in self._roomiest(self.site.seen_around(thing, BESIDE_M))
-            ]
-        return poses
+def _beside(site: GroundTruth, kind: str) -> list[Pose]:
+    return [
+        Pose(pose.x, pose.y, pose.point.bearing_to(site.place_of(thing)))
+        for thing in site.things(kind)
+        for pose in _roomiest(site, site.seen_around(thing, BESIDE_M))
+    ]
 
-    def _roomiest(self, cells: Mask) -> list[Pose]:
-        site = self.site
-        room = np.where(cells & site.drivable, clearance_m(site.grid), -1.0)
-        best = np.argsort(room, axis=None)[::-1][: MOST_GOALS * 40 : 40]
-        rows, cols = np.unravel_index(best, room.shape)
-        places = [
-            site.grid.point_at(Cell(int(row), int(col)))
-            for row, col in zip(rows, cols, strict=True)
-            if room[row, col] > 0
-        ]
-        return [Pose(place.x, place.y) for place in places]
+
+def _roomiest(site: GroundTruth, cells: Mask) -> list[Pose]:
+    room = np.where(cells & site.drivable, clearance_m(site.grid), -1.0)
+    best = np.argsort(room, axis=None)[::-1][: MOST_STANDS * 40 : 40]
+    rows, cols = np.unravel_index(best[room.flat[best] > 0], room.shape)
+    return [Pose(x, y) for x, y in site.grid.points_at(rows, cols).tolist()]
 
 
 def _known_answer(truth: Mapping[str, Any]) -> str | None:
@@ -101,24 +95,17 @@ MOST_DRIVES = 3
 MOST_SAID = 50.0
 
 
-@dataclass(frozen=True, slots=True)
-class RandomAgent:
-    """What chance alone is worth: the floor under every other agent's figures."""
-
-    name: str = "random"
-    connection: ServerAccess = ServerAccess.MEMORY
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Drive to some places that the map names, or answers."""
-        random, driver = np.random.default_rng(task.seed), ToolDriver(tools)
-        if "Answer without driving" in task.prompt:
-            return AgentEnd(answer=f"ANSWER: {await _say(task.prompt, random, driver)}")
-        for _ in range(int(random.integers(1, MOST_DRIVES + 1))):
-            view = await driver.look()
-            ids = [row.id for rows in view.tables.values() for row in rows]
-            if ids:
-                await driver.drive(place=str(random.choice(ids)))
-        return AgentEnd(answer="ANSWER: there")
+async def answer_at_random(task: Assignment, tools: ToolClient) -> AgentEnd:
+    """Drive to some places that the map names, or answer: what chance alone is worth."""
+    random, driver = np.random.default_rng(task.seed), ToolDriver(tools)
+    if "Answer without driving" in task.prompt:
+        return AgentEnd(answer=f"ANSWER: {await _say(task.prompt, random, driver)}")
+    for _ in range(int(random.integers(1, MOST_DRIVES + 1))):
+        view = await driver.look()
+        ids = [row.id for rows in view.tables.values() for row in rows]
+        if ids:
+            await driver.drive(place=str(random.choice(ids)))
+    return AgentEnd(answer="ANSWER: there")
 
 
 async def _say(prompt: str, random: np.random.Generator, driver: ToolDriver) -> str:
@@ -134,3 +121,158 @@ async def _say(prompt: str, random: np.random.Generator, driver: ToolDriver) -> 
     if "m" in form:
         return f"{random.uniform(0.0, MOST_SAID):.1f} {'m2' if 'm2' in form else 'm'}"
     return str(int(random.integers(1, 6)))
+
+
+# --- explorers -----------------------------------------------------------------------------------
+
+EXPLORING = "Update the map"
+SMALLEST = "Go to the smallest room"
+MOST_GOALS = 120
+FARTHEST_MISS_M = 0.5
+"""Two goals that lie nearer to each other are the same one."""
+STEP_M = 5.0
+"""The paper's prompt asks for waypoints at least so far away, ..."""
+BACK_M = 3.0
+"""... and for none so near to one that was visited."""
+LEAST_EDGE_M = 0.6
+"""A border with the unknown that is shorter is a crack."""
+DOOR_M = 1.2
+"""Free floor no wider counts as a doorway when rooms are told apart by eye."""
+LEAST_ROOM_M2 = 1.0
+
+
+async def _record(driver: ToolDriver) -> Pose:
+    """Record what is ahead, and return where that was."""
+    sightings = await driver.see()
+    pose = await driver.find_pose()
+    await driver.record(f"{pose.x:.1f}, {pose.y:.1f}", sightings)
+    return pose
+
+
+async def explore_nearest_frontiers(task: Assignment, tools: ToolClient) -> AgentEnd:
+    """Drive to the frontier with the shortest way, until there is none: the plain baseline.
+
+    It only explores; asked for anything else it gives up.
+    """
+    if not task.prompt.startswith(EXPLORING):
+        return gave_up("I only explore.")
+    driver, missed = ToolDriver(tools), list[Point]()
+    await _record(driver)
+    for _ in range(MOST_GOALS):
+        rows = (await driver.look()).rows("Frontiers")
+        goals = [(row.number("path m"), row.id, row.goal()) for row in rows]
+        left = [
+            goal
+            for goal in goals
+            if all(goal[2].distance_to(place) >= FARTHEST_MISS_M for place in missed)
+        ]
+        if not left:
+            return AgentEnd(answer="No frontier is left that I can reach.")
+        _, frontier, point = min(left, key=lambda goal: goal[:2])
+        if await driver.drive(place=frontier) == ARRIVED:
+            await _record(driver)
+        else:
+            missed.append(point)
+    return gave_up("There are too many frontiers.")
+
+
+async def follow_paper(task: Assignment, tools: ToolClient) -> AgentEnd:
+    """Do by script what the paper's prompt tells a model, with the paper's tools and the picture.
+
+    It sees free, unknown and occupied pixels and its own pose: no rooms, no frontiers, no tables.
+    Task 1 follows the prompt's steps. In Task 2 it takes for rooms what is left of the free floor
+    when narrow places are closed, and cannot tell a corridor from a room. In Task 3 it goes to the
+    nearest waypoint whose landmarks fit. Asked for anything else it gives up.
+    """
+    driver = ToolDriver(tools)
+    if task.prompt.startswith(EXPLORING):
+        return await _explore_by_picture(driver)
+    if task.prompt.startswith(SMALLEST):
+        return await _go_to_smallest_patch(driver)
+    label = find_label(task.prompt)
+    return gave_up("I do not know how.") if label is None else await _recall(driver, label)
+
+
+async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
+    pose = await _record(driver)
+    visited, missed = [pose.point], list[Point]()
+    for _ in range(MOST_GOALS):
+        grid = await _see_map(driver)
+        goal = _choose_waypoint(grid, pose.point, visited, missed)
+        if goal is None:
+            return AgentEnd(answer="No unexplored area is left.")
+        state = await driver.drive(x=goal.x, y=goal.y, yaw_deg=goal.yaw_deg)
+        if state == ARRIVED:
+            pose = await _record(driver)
+            visited.append(pose.point)
+        else:
+            missed.append(goal.point)
+    return gave_up("There is always something left to explore.")
+
+
+async def _see_map(driver: ToolDriver) -> OccupancyGrid:
+    """Look at all three of the paper's pictures, and read the first as it is drawn."""
+    plain = await driver.tools.demand("subscribe_map_as_image")
+    await driver.tools.demand("draw_map_axis")
+    await driver.tools.demand("draw_robot_pose")
+    return read_map_picture(plain.text, plain.pictures[0].data)
+
+
+def _choose_waypoint(
+    grid: OccupancyGrid, robot: Point, visited: Sequence[Point], missed: Sequence[Point]
+) -> Pose | None:
+    """Find the place that sees most of the border with the unknown, by the prompt's rules.
+
+    A place at least 5 m away comes first; where there is none, one that is nearer.
+    """
+    # Free cells beside unknown ones.
+    edge = grid.free & (cv2.dilate(grid.unknown.view(np.uint8), np.ones((3, 3), np.uint8)) > 0)
+    cells = round(2 * SIGHT_M / grid.resolution_m) | 1
+    in_sight = cv2.blur(edge.astype(np.float32), (cells, cells), borderType=cv2.BORDER_CONSTANT)
+    rows, cols = np.nonzero(np.isfinite(ways_to_floor_m(grid, robot, radius_m=MARGIN_M)))
+    if not rows.size:
+        return None
+    points = grid.points_at(rows, cols)
+    worth = in_sight[rows, cols].astype(np.float64) * cells**2 * grid.resolution_m
+    worth[worth < LEAST_EDGE_M] = 0.0
+    for place in visited:
+        worth[_ways_m(points, place) < BACK_M] = 0.0
+    for place in missed:
+        worth[_ways_m(points, place) < FARTHEST_MISS_M] = 0.0
+    is_far = _ways_m(points, robot) >= STEP_M
+    chosen = worth * is_far if (worth * is_far).any() else worth
+    if not chosen.any():
+        return None
+    x, y = points[int(np.argmax(chosen))].tolist()
+    borders = grid.points_at(*np.nonzero(edge))
+    nearest = borders[int(np.argmin(_ways_m(borders, Point(x, y))))].tolist()
+    return Pose(x, y, Point(x, y).bearing_to(Point(*nearest)))
+
+
+def _ways_m(points: FloatArray, place: Point) -> FloatArray:
+    return np.asarray(np.hypot(points[:, 0] - place.x, points[:, 1] - place.y))
+
+
+async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
+    """Go into the smallest piece of floor that is left when narrow places are closed."""
+    grid = await _see_map(driver)
+    room_m = clearance_m(grid)
+    n_patches, labels, statistics, _ = cv2.connectedComponentsWithStats(
+        (grid.free & (room_m > DOOR_M / 2)).astype(np.uint8)
+    )
+    areas_m2 = statistics[:, cv2.CC_STAT_AREA] * grid.resolution_m**2
+    patches = [label for label in range(1, n_patches) if areas_m2[label] >= LEAST_ROOM_M2]
+    for label in sorted(patches, key=lambda each: float(areas_m2[each])):
+        deepest = point_of_largest(grid, np.where(labels == label, room_m, -1.0))
+        if await driver.drive(x=deepest.x, y=deepest.y) == ARRIVED:
+            return AgentEnd(answer="This looks like the smallest room.")
+    return gave_up("I see no room that I can get to.")
+
+
+async def _recall(driver: ToolDriver, label: str) -> AgentEnd:
+    """Go to the nearest waypoint, in a straight line, that remembers the thing."""
+    seen, pose = await driver.recall(label), await driver.find_pose()
+    if not seen:
+        return gave_up(f"I remember no {label}.")
+    nearest = min(seen, key=lambda each: each.view.point.distance_to(pose.point))
+    return AgentEnd(answer=f"{nearest.place}: {await driver.drive(place=nearest.place)}.")

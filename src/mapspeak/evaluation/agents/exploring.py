@@ -1,199 +1,176 @@
-"""Two explorers to compare with: the nearest frontier, and the paper's loop from pictures alone."""
+"""How the script explores and records, with nothing but what tools answer: the paper's Task 1."""
 
+import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.driver import ARRIVED, ToolDriver, find_label, gave_up
-from mapspeak.evaluation.policy import MARGIN_M, SIGHT_M, ways_to_floor_m
-from mapspeak.evaluation.reading import Row, read_map_picture
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
+from mapspeak.evaluation.agent import ToolClient
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
+from mapspeak.evaluation.agents.reading import Row, read_map_picture
 from mapspeak.geometry import Point, Pose
-from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
-from mapspeak.spatial.paths import clearance_m
+from mapspeak.spatial.paths import clearance_m, distances_from
 
-EXPLORING = "Update the map"
-SMALLEST = "Go to the smallest room"
-MOST_GOALS = 120
-FARTHEST_MISS_M = 0.5
-"""Two goals that lie nearer to each other are the same one."""
-STEP_M = 5.0
-"""The paper's prompt asks for waypoints at least so far away, ..."""
-BACK_M = 3.0
-"""... and for none so near to one that was visited."""
-LEAST_EDGE_M = 0.6
-"""A border with the unknown that is shorter is a crack."""
-DOOR_M = 1.2
-"""Free floor no wider counts as a doorway when rooms are told apart by eye."""
-LEAST_ROOM_M2 = 1.0
+SIGHT_M = 4.0
+"""How far a look-around counts: things beyond it are seen, but small."""
+LEAST_AREA_M2 = 1.5
+N_RAYS = 180
 
 
-async def _record(driver: ToolDriver) -> Pose:
-    """Record what is ahead, and return where that was."""
-    sightings = await driver.see()
-    pose = await driver.find_pose()
-    await driver.record(f"{pose.x:.1f}, {pose.y:.1f}", sightings)
-    return pose
-
-
-@dataclass(frozen=True, slots=True)
-class NearestFrontierAgent:
-    """Drives to the frontier with the shortest way, until there is none: the plain baseline.
-
-    It only explores; asked for anything else it gives up.
-    """
-
-    name: str = "nearest-frontier"
-    connection: ServerAccess = ServerAccess.MEMORY
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment."""
-        if not task.prompt.startswith(EXPLORING):
-            return gave_up("I only explore.")
-        driver, missed = ToolDriver(tools), list[Point]()
-        await _record(driver)
-        for _ in range(MOST_GOALS):
-            rows = (await driver.look()).rows("Frontiers")
-            goals = [(row.number("path m"), row.id, _point_of(row)) for row in rows]
-            left = [
-                goal
-                for goal in goals
-                if all(goal[2].distance_to(place) >= FARTHEST_MISS_M for place in missed)
-            ]
-            if not left:
-                return AgentEnd(answer="No frontier is left that I can reach.")
-            _, frontier, point = min(left, key=lambda goal: goal[:2])
-            if await driver.drive(place=frontier) == ARRIVED:
-                await _record(driver)
-            else:
-                missed.append(point)
-        return gave_up("There are too many frontiers.")
-
-
-@dataclass(frozen=True, slots=True)
-class PaperLoopAgent:
-    """Does by script what the paper's prompt tells a model, with the paper's tools and the picture.
-
-    It sees free, unknown and occupied pixels and its own pose: no rooms, no frontiers, no tables.
-    Task 1 follows the prompt's steps. In Task 2 it takes for rooms what is left of the free floor
-    when narrow places are closed, and cannot tell a corridor from a room. In Task 3 it goes to the
-    nearest waypoint whose landmarks fit. Asked for anything else it gives up.
-    """
-
-    name: str = "paper-loop"
-    connection: ServerAccess = ServerAccess.MEMORY
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment."""
-        driver = ToolDriver(tools)
-        if task.prompt.startswith(EXPLORING):
-            return await _explore_by_picture(driver)
-        if task.prompt.startswith(SMALLEST):
-            return await _go_to_smallest_patch(driver)
-        label = find_label(task.prompt)
-        return gave_up("I do not know how.") if label is None else await _recall(driver, label)
-
-
-async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
-    pose = await _record(driver)
-    visited, missed = [pose.point], list[Point]()
-    for _ in range(MOST_GOALS):
-        grid = await _see_map(driver)
-        goal = _choose_waypoint(grid, pose.point, visited, missed)
-        if goal is None:
-            return AgentEnd(answer="No unexplored area is left.")
-        state = await driver.drive(x=goal.x, y=goal.y, yaw_deg=goal.yaw_deg)
-        if state == ARRIVED:
-            pose = await _record(driver)
-            visited.append(pose.point)
-        else:
-            missed.append(goal.point)
-    return gave_up("There is always something left to explore.")
-
-
-async def _see_map(driver: ToolDriver) -> OccupancyGrid:
-    """Look at all three of the paper's pictures, and read the first as it is drawn."""
-    plain = await driver.tools.demand("subscribe_map_as_image")
-    await driver.tools.demand("draw_map_axis")
-    await driver.tools.demand("draw_robot_pose")
-    return read_map_picture(plain.text, plain.pictures[0].data)
-
-
-def _choose_waypoint(
-    grid: OccupancyGrid, robot: Point, visited: Sequence[Point], missed: Sequence[Point]
-) -> Pose | None:
-    """Find the place that sees most of the border with the unknown, by the prompt's rules.
-
-    A place at least 5 m away comes first; where there is none, one that is nearer.
-    """
-    edge = _edge_of_unknown(grid)
-    cells = round(2 * SIGHT_M / grid.resolution_m) | 1
-    in_sight = cv2.blur(edge.astype(np.float32), (cells, cells), borderType=cv2.BORDER_CONSTANT)
-    rows, cols = np.nonzero(np.isfinite(ways_to_floor_m(grid, robot, radius_m=MARGIN_M)))
-    if not rows.size:
+def find_viewpoint(
+    grid: OccupancyGrid, robot: Point, looked_from: Sequence[Point], *, radius_m: float
+) -> Point | None:
+    """Find the middle of the nearest piece of floor that is still to be looked at, or None."""
+    ways_m = ways_to_floor_m(grid, robot, radius_m=radius_m)
+    is_left = np.isfinite(ways_m)
+    for place in looked_from:
+        is_left &= ~_near_in_sight(grid, place)
+    piece = _find_nearest_piece(grid, is_left, ways_m)
+    if piece is None:
         return None
-    points = grid.points_at(rows, cols)
-    worth = in_sight[rows, cols].astype(np.float64) * cells**2 * grid.resolution_m
-    worth[worth < LEAST_EDGE_M] = 0.0
-    for place in visited:
-        worth[_ways_m(points, place) < BACK_M] = 0.0
-    for place in missed:
-        worth[_ways_m(points, place) < FARTHEST_MISS_M] = 0.0
-    is_far = _ways_m(points, robot) >= STEP_M
-    chosen = worth * is_far if (worth * is_far).any() else worth
-    if not chosen.any():
-        return None
-    x, y = points[int(np.argmax(chosen))].tolist()
-    return Pose(x, y, Point(x, y).bearing_to(_nearest(grid, edge, Point(x, y))))
-
-
-def _edge_of_unknown(grid: OccupancyGrid) -> Mask:
-    """Return free cells beside unknown ones."""
-    beside = cv2.dilate(grid.unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return np.asarray(grid.free & beside)
-
-
-def _nearest(grid: OccupancyGrid, cells: Mask, point: Point) -> Point:
-    points = grid.points_at(*np.nonzero(cells))
-    x, y = points[int(np.argmin(_ways_m(points, point)))].tolist()
-    return Point(x, y)
-
-
-def _ways_m(points: FloatArray, place: Point) -> FloatArray:
-    return np.asarray(np.hypot(points[:, 0] - place.x, points[:, 1] - place.y))
-
-
-async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
-    """Go into the smallest piece of floor that is left when narrow places are closed."""
-    grid = await _see_map(driver)
-    room_m = clearance_m(grid)
-    n_patches, labels, statistics, _ = cv2.connectedComponentsWithStats(
-        (grid.free & (room_m > DOOR_M / 2)).astype(np.uint8)
+    depth = cv2.distanceTransform(
+        np.pad(piece.view(np.uint8), 1), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
     )
+    return point_of_largest(grid, np.where(piece, depth[1:-1, 1:-1] + clearance_m(grid), 0.0))
+
+
+def point_of_largest(grid: OccupancyGrid, values: FloatArray) -> Point:
+    """Return the middle of the cell that has the largest value."""
+    row, col = np.unravel_index(int(np.argmax(values)), values.shape)
+    return grid.point_at(Cell(int(row), int(col)))
+
+
+def ways_to_floor_m(grid: OccupancyGrid, robot: Point, *, radius_m: float) -> FloatArray:
+    """Return the way to each free cell; infinite for all others and where there is none."""
+    rows, cols = np.nonzero(grid.free)
+    ways_m = np.full(grid.cells.shape, np.inf)
+    ways_m[rows, cols] = distances_from(grid, robot, radius_m=radius_m).distances_at(rows, cols)
+    return ways_m
+
+
+def _near_in_sight(grid: OccupancyGrid, place: Point) -> Mask:
+    """Return the cells that can be seen from a place and are near it."""
+    angles = np.linspace(-math.pi, math.pi, N_RAYS, endpoint=False)
+    ahead = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    here, reach = np.array([place.x, place.y]), np.arange(0.0, SIGHT_M, grid.resolution_m)
+    on_rays = here + ahead[:, None] * reach[:, None]
+    is_open = grid.look_up(grid.free, on_rays, outside=False)
+    n_open = np.where(is_open.all(axis=1), reach.size, np.argmin(is_open, axis=1))
+    ends = here + ahead * (n_open * grid.resolution_m)[:, None]
+    corners = grid.fractional_cells_at(ends)[:, ::-1] - 0.5
+    seen = np.zeros(grid.cells.shape, dtype=np.uint8)
+    cv2.fillPoly(seen, [np.round(corners).astype(np.int32)], 1)
+    return seen > 0
+
+
+def _find_nearest_piece(grid: OccupancyGrid, is_left: Mask, ways_m: FloatArray) -> Mask | None:
+    n_pieces, labels, statistics, _ = cv2.connectedComponentsWithStats(is_left.astype(np.uint8))
     areas_m2 = statistics[:, cv2.CC_STAT_AREA] * grid.resolution_m**2
-    patches = [label for label in range(1, n_patches) if areas_m2[label] >= LEAST_ROOM_M2]
-    for label in sorted(patches, key=lambda each: float(areas_m2[each])):
-        deepest = int(np.argmax(np.where(labels == label, room_m, -1.0)))
-        row, col = np.unravel_index(deepest, room_m.shape)
-        x, y = grid.points_at(np.array([row]), np.array([col]))[0].tolist()
-        if await driver.drive(x=x, y=y) == ARRIVED:
-            return AgentEnd(answer="This looks like the smallest room.")
-    return gave_up("I see no room that I can get to.")
+    large = [label for label in range(1, n_pieces) if areas_m2[label] >= LEAST_AREA_M2]
+    if not large:
+        return None
+    nearest = min(large, key=lambda label: float(ways_m[labels == label].min()))
+    return np.asarray(labels == nearest)
 
 
-async def _recall(driver: ToolDriver, label: str) -> AgentEnd:
-    """Go to the nearest waypoint, in a straight line, that remembers the thing."""
-    seen, pose = await driver.recall(label), await driver.find_pose()
-    if not seen:
-        return gave_up(f"I remember no {label}.")
-    nearest = min(seen, key=lambda each: each.view.point.distance_to(pose.point))
-    return AgentEnd(answer=f"{nearest.place}: {await driver.drive(place=nearest.place)}.")
+MOST_GOALS = 80
+WAIT_S = 20.0
+LEAST_ROOM_M2 = 3.0
+MOST_VIEWPOINTS = 60
+MARGIN_M = 0.45
+"""A viewpoint keeps this clear of walls: as much as the robot needs and a little more."""
+LOOK_AROUND_EVERY_M = 4.0
+LOOK_AROUND_DEG = (90.0, 180.0, 270.0)
 
 
-def _point_of(frontier: Row) -> Point:
-    x, y = frontier.cells["go to x, y, yaw"].split(",")[:2]
-    return Point(float(x), float(y))
+class ScriptedExploration:
+    """Explores, and records what is seen on the way."""
+
+    _grid: OccupancyGrid
+    _pose: Pose
+
+    def __init__(self, tools: ToolClient) -> None:
+        self._driver = ToolDriver(tools, wait_s=WAIT_S)
+        self._n_goals = 0
+        self._looked_at: list[Point] = []
+
+    async def explore(self) -> None:
+        """Drive to frontiers and record what is seen, until none is left to reach.
+
+        It explores once more after the survey: by then more is known.
+        """
+        await self._look()
+        await self._record_surroundings()
+        await self._follow_frontiers()
+        await self._survey()
+        await self._look()
+        await self._follow_frontiers()
+
+    async def _look(self) -> None:
+        plain = await self._driver.tools.demand("subscribe_map_as_image")
+        self._pose = (await self._driver.look()).pose
+        self._grid = read_map_picture(plain.text, plain.pictures[0].data)
+
+    async def _follow_frontiers(self) -> None:
+        """Let the robot explore, one frontier at a time, until none is left that it can reach."""
+        while self._n_goals < MOST_GOALS and (n_goals := await self._explore_one()):
+            self._n_goals += n_goals
+            await self._look()
+            await self._record_surroundings()
+
+    async def _explore_one(self) -> int:
+        """Return how many frontiers the robot set out to, none where nothing is left."""
+        while True:
+            answer = await self._driver.tools.demand("explore", n_goals=1, wait_s=WAIT_S)
+            if answer.report["state"] != "driving":
+                return int(answer.report["n_goals"])
+
+    async def _survey(self) -> None:
+        """Look around wherever floor has not been looked at from near."""
+        for _ in range(MOST_VIEWPOINTS):
+            here = self._pose.point
+            point = find_viewpoint(self._grid, here, self._looked_at, radius_m=MARGIN_M)
+            if point is None:
+                return
+            state = await self._driver.drive(x=point.x, y=point.y)
+            await self._look()
+            if state == ARRIVED:
+                await self._record_surroundings()
+            self._looked_at.append(point)
+
+    async def _record_surroundings(self) -> None:
+        """Record what is ahead and, where it has not looked around near by, to all sides."""
+        pose = self._pose
+        await self._record()
+        if any(pose.point.distance_to(place) < LOOK_AROUND_EVERY_M for place in self._looked_at):
+            return
+        self._looked_at.append(pose.point)
+        for turn_deg in LOOK_AROUND_DEG:
+            yaw_deg = math.remainder(pose.yaw_deg + turn_deg, 360.0)
+            await self._driver.tools.call("navigate_to", x=pose.x, y=pose.y, yaw_deg=yaw_deg)
+            await self._record()
+
+    async def _record(self) -> None:
+        sightings = await self._driver.see()
+        place = (await self._driver.tools.demand("get_robot_pose")).report
+        await self._driver.record(place["place"], sightings)
+
+
+def is_room(row: Row, doors: tuple[Row, ...]) -> bool:
+    """Return True for a room.
+
+    What furniture cuts off is tiny, or open to one neighbour several times.
+    """
+    names = re.findall(r"D\d+", row.cells["doors"])
+    ways_in = [
+        door.cells["joins"]
+        for door in doors
+        if door.id in names and not door.cells["path m"].startswith("no way")
+    ]
+    is_nook = len(ways_in) > len(set(ways_in))
+    is_large_enough = row.number("floor m2") >= LEAST_ROOM_M2
+    return row.cells["kind"] == "room" and is_large_enough and not is_nook

@@ -1,20 +1,26 @@
 """Agents by their names: scripts, models and client programs, and what they need."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.baselines import OracleAgent, RandomAgent
+from mapspeak.evaluation.agent import Agent, Script, ScriptAgent
+from mapspeak.evaluation.agents.baselines import (
+    answer_at_random,
+    answer_by_truth,
+    explore_nearest_frontiers,
+    follow_paper,
+)
 from mapspeak.evaluation.agents.command.agent import CommandAgent
 from mapspeak.evaluation.agents.command.program import find_program
-from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
-from mapspeak.evaluation.agents.models.chat import MockModel, Thinking
-from mapspeak.evaluation.agents.models.loop import ModelAgent
-from mapspeak.evaluation.agents.scripted import ScriptedAgent
+from mapspeak.evaluation.agents.models.chat import ModelAgent, Thinking
+from mapspeak.evaluation.agents.models.mock import MockModel
+from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.trials import Agent, Setting
+from mapspeak.evaluation.trials import Setting
 from mapspeak.installation import say_install
 
 if TYPE_CHECKING:
@@ -26,11 +32,11 @@ CLIENT = "openai"
 """The package that inspect-ai speaks through where there is no other; the extra brings it."""
 CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
 """Packages that it wants besides, by the provider."""
-SCRIPTS: dict[str, Callable[[], Agent]] = {
-    "scripted": ScriptedAgent,
-    "random": RandomAgent,
-    "nearest-frontier": NearestFrontierAgent,
-    "paper-loop": PaperLoopAgent,
+SCRIPTS: dict[str, Script] = {
+    "scripted": follow_script,
+    "random": answer_at_random,
+    "nearest-frontier": explore_nearest_frontiers,
+    "paper-loop": follow_paper,
 }
 
 
@@ -45,14 +51,13 @@ def check_agent(name: str, thinking: str | None = None) -> None:
     Raises:
         ConfigError: There is no such agent, or something that it needs is missing.
     """
-    if name == ORACLE:
-        return
+    amount = read_thinking(thinking)
     if _is_model(name):
-        _open_model(name, read_thinking(thinking)).open()
-        return
-    agent = find_agent(name, thinking)
-    if isinstance(agent, CommandAgent):
-        agent.check()
+        _open_model(name, amount).open()
+    elif name.startswith(COMMAND):
+        find_program(name.removeprefix(COMMAND)).check(amount)
+    elif name not in agent_names():
+        raise _no_agent(name)
 
 
 def find_agent(
@@ -71,16 +76,20 @@ def find_agent(
     """
     amount = read_thinking(thinking)
     if name == ORACLE and truth is not None:
-        return OracleAgent(*truth)
+        return ScriptAgent(name, partial(answer_by_truth, *truth))
     if name in SCRIPTS:
-        return SCRIPTS[name]()
+        return ScriptAgent(name, SCRIPTS[name])
     if name == MOCK:
-        return ModelAgent(MockModel(), name)
+        return ModelAgent(MockModel, name)
     if name.startswith(COMMAND):
         return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
     if _is_model(name):
-        return ModelAgent(_open_model(name, amount), name)
-    raise ConfigError(
+        return ModelAgent(_open_model(name, amount).begin, name)
+    raise _no_agent(name)
+
+
+def _no_agent(name: str) -> ConfigError:
+    return ConfigError(
         f"There is no agent {name[:80]!r}.",
         hint=f"There are: {', '.join(agent_names())}; "
         "PROVIDER/MODEL for a model, command:PROGRAM for a client program.",

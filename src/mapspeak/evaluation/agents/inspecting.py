@@ -5,8 +5,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.trials import AgentEnd, TrialState
+from mapspeak.evaluation.agent import AgentEnd, ToolClient
+from mapspeak.evaluation.trials import TrialState
 
 OURSELVES = "/rosbridge_websocket"
 FIELD = re.compile(r"^(\w+): (\S+)", re.MULTILINE)

@@ -3,24 +3,23 @@
 import math
 import re
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 
 from mapspeak.errors import MapspeakError
-from mapspeak.evaluation.agents.inspecting import diagnose
-from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
-from mapspeak.evaluation.driver import (
-    ARRIVED,
-    WAIT_S,
-    Seen,
-    ToolDriver,
-    find_label,
+from mapspeak.evaluation.agent import (
+    AgentEnd,
+    Assignment,
+    OutOfBudgetError,
+    ToolAnswer,
+    ToolClient,
     gave_up,
-    step,
 )
-from mapspeak.evaluation.policy import ExplorationPolicy, is_room
-from mapspeak.evaluation.reading import MapReading, Row, read_sightings
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
+from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Seen, ToolDriver, find_label
+from mapspeak.evaluation.agents.exploring import ScriptedExploration, is_room
+from mapspeak.evaluation.agents.inspecting import diagnose
+from mapspeak.evaluation.agents.reading import MapReading, Row, read_sightings
+from mapspeak.evaluation.trials import TrialState
 from mapspeak.geometry import Point, wrap_angle
+from mapspeak.places.standing import point_ahead
 
 NEAR_M = 4.5
 """A place that saw a thing from no farther leads to it."""
@@ -39,39 +38,29 @@ SEARCH = "search_for"
 Deed = Callable[[ToolDriver, re.Match[str]], Awaitable[AgentEnd]]
 
 
-@dataclass(frozen=True, slots=True)
-class ScriptedAgent:
-    """Reads the prompt by its words and does what fits."""
-
-    name: str = "scripted"
-    connection: ServerAccess = ServerAccess.MEMORY
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment."""
-        try:
-            return await _do(ToolDriver(tools), task.prompt)
-        except OutOfBudgetError:
-            raise
-        except MapspeakError as error:
-            return gave_up(f"A tool did not give what I need: {error}")
-
-
-async def _do(driver: ToolDriver, prompt: str) -> AgentEnd:
-    for pattern, deed in DEEDS:
-        match = re.search(pattern, prompt)
-        if match is not None:
-            return await deed(driver, match)
-    label = find_label(prompt)
-    if label is None:
-        return gave_up("I know no word of this.")
-    return await _go_to_thing(driver, label)
+async def follow_script(task: Assignment, tools: ToolClient) -> AgentEnd:
+    """Read the prompt by its words and do what fits."""
+    driver = ToolDriver(tools)
+    try:
+        for pattern, deed in DEEDS:
+            match = re.search(pattern, task.prompt)
+            if match is not None:
+                return await deed(driver, match)
+        label = find_label(task.prompt)
+        if label is None:
+            return gave_up("I know no word of this.")
+        return await _go_to_thing(driver, label)
+    except OutOfBudgetError:
+        raise
+    except MapspeakError as error:
+        return gave_up(f"A tool did not give what I need: {error}")
 
 
 # --- exploring -----------------------------------------------------------------------------------
 
 
 async def _explore(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
-    await ExplorationPolicy(driver.tools).explore()
+    await ScriptedExploration(driver.tools).explore()
     return AgentEnd(answer="Everything that can be reached is on the map.")
 
 
@@ -120,7 +109,7 @@ async def _aside(driver: ToolDriver, middle: Point) -> list[Point]:
     """Return some points beside another one in the same room."""
     room = await driver.find_region(middle)
     points = [
-        step(middle, math.radians(heading_deg), away_m)
+        point_ahead(middle, math.radians(heading_deg), away_m)
         for away_m in ASIDE_M
         for heading_deg in (0.0, 90.0, 180.0, -90.0)
     ]
@@ -184,7 +173,7 @@ async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m:
     for left_m in (BESIDE_M, 2 * BESIDE_M, range_m / 2):
         if range_m <= left_m:
             break
-        way = step(pose.point, heading_rad, range_m - left_m)
+        way = point_ahead(pose.point, heading_rad, range_m - left_m)
         yaw_deg = math.degrees(wrap_angle(heading_rad))
         if await driver.drive(x=way.x, y=way.y, yaw_deg=yaw_deg) == ARRIVED:
             break
@@ -197,7 +186,7 @@ async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m:
 async def _go_beside_pose(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     heading_rad = math.radians(float(match["yaw"]) + SIDES_DEG[match["side"]])
     person = Point(float(match["x"]), float(match["y"]))
-    goal = step(person, heading_rad, float(match["away"]))
+    goal = point_ahead(person, heading_rad, float(match["away"]))
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 
@@ -206,7 +195,7 @@ async def _go_beside_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd
     if thing is None:
         return gave_up(f"I remember no {match['label']}.")
     heading_rad = math.radians(COMPASS_DEG[match["direction"]])
-    goal = step(thing, heading_rad, float(match["away"]))
+    goal = point_ahead(thing, heading_rad, float(match["away"]))
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 

@@ -5,15 +5,23 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import anyio
 import cv2
 
 from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agent import (
+    Agent,
+    AgentEnd,
+    Assignment,
+    OutOfBudgetError,
+    Picture,
+    ServerAccess,
+    ToolClient,
+    Witness,
+)
 from mapspeak.evaluation.agents.finding import find_agent
-from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient, Witness
-from mapspeak.evaluation.runs.workplace import CONTROL, Workshop, open_workplace
+from mapspeak.evaluation.runs.workplace import CONTROL, TrialSetup, open_workplace
 from mapspeak.evaluation.scores.answers import Evidence
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import find_task
@@ -23,12 +31,8 @@ from mapspeak.evaluation.trials import (
     PICTURES,
     STATES,
     TURNS,
-    Agent,
-    AgentEnd,
-    Assignment,
     Limits,
     Score,
-    ServerAccess,
     Setting,
     ToolCall,
     Trial,
@@ -44,7 +48,7 @@ from mapspeak.spatial.mapfiles import load_map
 
 
 class Transcript(Witness):
-    """The witness of one trial.
+    """The witness of one trial, which holds it to its limits and writes all down.
 
     Args:
         limits: What it may cost; wall time is watched from outside.
@@ -57,7 +61,7 @@ class Transcript(Witness):
         folder: Path,
         limits: Limits,
         look: Callable[[], StateRecord],
-        on_turn: Callable[[Turn], None] | None = None,
+        on_turn: Callable[[Turn], None] | None,
     ) -> None:
         self.n_turns = 0
         self.n_errors = 0
@@ -69,81 +73,45 @@ class Transcript(Witness):
         self._pictures = folder / PICTURES
         self._turns = (folder / TURNS).open("wb")
 
-    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        """Write a call down.
+    def hear(self, turn: Turn, pictures: tuple[Picture, ...] = ()) -> None:
+        """Write a turn down, with where the robot then stood, and keep its pictures.
 
         Raises:
-            OutOfBudgetError: It would be one too many, or comes too late.
+            OutOfBudgetError: The call would be one too many, or comes too late.
         """
-        limits = self._limits
-        if len(self.calls) >= limits.n_calls:
-            raise OutOfBudgetError(
-                f"More than {limits.n_calls} calls.", hint="Decide with fewer calls."
-            )
-        if self._look().time_s > limits.robot_time_s:
-            raise OutOfBudgetError(
-                f"More than {limits.robot_time_s:.0f} s of robot time.", hint="Drive less."
-            )
-        call = ToolCall(tool=tool, arguments=arguments)
-        self.calls.append(call)
-        self._write("agent", call=call)
-
-    def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
-        """Write an answer down and keep its pictures."""
-        self.n_errors += answer.is_error
-        names = [self._keep(picture.data, picture.suffix) for picture in answer.pictures]
-        self._write(
-            "tool",
-            answer.text,
-            call=ToolCall(tool=tool, arguments={}),
-            is_error=answer.is_error,
-            pictures=tuple(names),
+        state, limits = self._look(), self._limits
+        if turn.role == "agent" and turn.call is not None:
+            if len(self.calls) >= limits.n_calls:
+                said = f"More than {limits.n_calls} calls."
+                raise OutOfBudgetError(said, hint="Decide with fewer calls.")
+            if state.time_s > limits.robot_time_s:
+                said = f"More than {limits.robot_time_s:.0f} s of robot time."
+                raise OutOfBudgetError(said, hint="Drive less.")
+            self.calls.append(turn.call)
+        self.n_errors += turn.is_error
+        noted = replace(
+            turn,
+            pictures=tuple(map(self._keep, pictures)),
+            wall_s=round(time.perf_counter() - self._begun_s, 3),
+            robot_s=state.time_s,
+            pose=state.pose,
         )
-
-    def hear_words(
-        self,
-        role: str,
-        text: str,
-        *,
-        n_input_tokens: int | None = None,
-        n_output_tokens: int | None = None,
-        n_picture_tokens: int | None = None,
-    ) -> None:
-        """Write down what was said besides calls."""
-        self._write(
-            role,
-            text,
-            n_input_tokens=n_input_tokens,
-            n_output_tokens=n_output_tokens,
-            n_picture_tokens=n_picture_tokens,
-        )
+        self.n_turns += 1
+        self._turns.write(turn_line(noted))
+        self._turns.flush()
+        if self._on_turn is not None:
+            self._on_turn(noted)
 
     def close(self) -> None:
         """End the file."""
         self._turns.close()
 
-    def _write(self, role: str, text: str = "", **more: Any) -> None:  # noqa: ANN401 - fields of Turn
-        state = self._look()
-        turn = Turn(
-            role=role,
-            text=text,
-            wall_s=round(time.perf_counter() - self._begun_s, 3),
-            robot_s=state.time_s,
-            pose=state.pose,
-            **more,
-        )
-        self.n_turns += 1
-        self._turns.write(turn_line(turn))
-        self._turns.flush()
-        if self._on_turn is not None:
-            self._on_turn(turn)
-
-    def _keep(self, data: bytes, suffix: str) -> str:
+    def _keep(self, picture: Picture) -> str:
         self._pictures.mkdir(exist_ok=True)
-        name = f"{self.n_turns:03d}{suffix}"
+        name = f"{self.n_turns:03d}{picture.suffix}"
         if (self._pictures / name).exists():
-            name = f"{self.n_turns:03d}-{len(list(self._pictures.iterdir()))}{suffix}"
-        (self._pictures / name).write_bytes(data)
+            name = f"{self.n_turns:03d}-{len(list(self._pictures.iterdir()))}{picture.suffix}"
+        (self._pictures / name).write_bytes(picture.data)
         return name
 
 
@@ -169,19 +137,19 @@ def attempt(
     # Trials share the machine: one thread each costs least.
     cv2.setNumThreads(1)
     site, task = GroundTruth(world), find_task(trial.task)
-    shop = _prepare(run, trial, site, preparation, control)
-    setting, folder = shop.setting, shop.folder
+    setup = _prepare(run, trial, site, preparation, control)
+    setting = setup.setting
     as_set = _as_set(site, setting)
     agent = find_agent(trial.agent, trial.thinking, (setting, as_set))
     begun_s = time.perf_counter()
-    end, transcript = anyio.run(_work, shop, agent, connection or agent.connection, on_turn)
-    wall_s = time.perf_counter() - begun_s
-    evidence = _gather(folder, transcript, end)
+    end, transcript = anyio.run(_work, setup, agent, connection or agent.connection, on_turn)
+    wall_s = round(time.perf_counter() - begun_s, 3)
+    evidence = _gather(setup.folder, transcript, end)
     result = _sum_up(trial, setting, evidence, end, task.score(as_set, setting, evidence))
     result = replace(
         result,
         n_turns=transcript.n_turns,
-        wall_s=round(wall_s, 3),
+        wall_s=wall_s,
         cpu_s=round(time.process_time() - begun_cpu_s, 3),
     )
     write_result(run, result)
@@ -190,17 +158,17 @@ def attempt(
 
 def _prepare(
     run: Path, trial: Trial, site: GroundTruth, preparation: Trial | None, control: Path | None
-) -> Workshop:
+) -> TrialSetup:
     folder = trial_folder(run, trial)
     folder.mkdir(parents=True, exist_ok=True)
     prepared = None if preparation is None else trial_folder(run, preparation)
-    memory = _read_if_there(prepared / MEMORY) if prepared is not None else None
+    memory = None if prepared is None else _read_if_there(prepared / MEMORY)
     setting = find_task(trial.task).make_setting(site, seed=trial.seed, memory=memory)
     if setting.is_known and prepared is None:
         raise ConfigError(
             f"The task {trial.task} starts from a finished map.", hint="Explore the world first."
         )
-    return Workshop(
+    return TrialSetup(
         trial=trial,
         setting=setting,
         world=site.world,
@@ -218,33 +186,34 @@ def _as_set(site: GroundTruth, setting: Setting) -> GroundTruth:
 
 
 async def _work(
-    shop: Workshop,
+    setup: TrialSetup,
     agent: Agent,
     connection: ServerAccess,
     on_turn: Callable[[Turn], None] | None,
 ) -> tuple[AgentEnd, Transcript]:
-    setting = shop.setting
-    async with open_workplace(shop, connection) as place:
-        transcript = Transcript(shop.folder, setting.limits, place.look, on_turn)
-        system = "\n\n".join(filter(None, (place.instructions, setting.guidance)))
+    setting = setup.setting
+    async with open_workplace(setup, connection) as place:
+        transcript = Transcript(setup.folder, setting.limits, place.look, on_turn)
+        told = "" if place.client is None else place.client.instructions or ""
+        system = "\n\n".join(filter(None, (told, setting.guidance)))
         assignment = Assignment(
             prompt=setting.prompt,
             system=system,
             limits=setting.limits,
-            seed=shop.trial.seed,
+            seed=setup.trial.seed,
             server=place.command,
-            folder=shop.folder,
+            folder=setup.folder,
         )
         end = AgentEnd(answer="It took too long.", state=TrialState.OUT_OF_BUDGET)
         with closing(transcript):
-            transcript.hear_words("system", system)
-            transcript.hear_words("user", setting.prompt)
+            transcript.hear(Turn(role="system", text=system))
+            transcript.hear(Turn(role="user", text=setting.prompt))
             try:
                 with anyio.move_on_after(setting.limits.wall_s):
                     end = await agent.run(assignment, ToolClient(place.client, transcript))
             except* OutOfBudgetError as group:
                 end = AgentEnd(answer=str(group.exceptions[0]), state=TrialState.OUT_OF_BUDGET)
-            transcript.hear_words("agent", end.answer)
+            transcript.hear(Turn(role="agent", text=end.answer))
     return end, transcript
 
 
@@ -263,14 +232,14 @@ def _gather(folder: Path, transcript: Transcript, end: AgentEnd) -> Evidence:
 def _sum_up(
     trial: Trial, setting: Setting, evidence: Evidence, end: AgentEnd, score: Score
 ) -> TrialResult:
-    n_calls = len(evidence.calls)
+    n_calls, last = len(evidence.calls), evidence.last
     return TrialResult(
         trial=trial,
         prompt=setting.prompt,
         answer=end.answer,
         state=end.state,
         score=score,
-        driven_m=round(evidence.last.driven_m, 3),
+        driven_m=round(last.driven_m, 3),
         shortest_m=setting.truth.get("shortest_m"),
         n_calls=n_calls,
         n_decisions=n_calls if end.n_decisions is None else end.n_decisions,
@@ -278,8 +247,8 @@ def _sum_up(
         n_input_tokens=end.n_input_tokens,
         n_output_tokens=end.n_output_tokens,
         n_picture_tokens=end.n_picture_tokens,
-        robot_s=evidence.last.time_s,
-        n_collisions=evidence.last.n_collisions,
+        robot_s=last.time_s,
+        n_collisions=last.n_collisions,
     )
 
 

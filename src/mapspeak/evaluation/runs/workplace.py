@@ -14,9 +14,10 @@ from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 from mcp.server.mcpserver import MCPServer
 
+from mapspeak.evaluation.agent import ServerAccess
 from mapspeak.evaluation.inspected.playing import InspectedSystem, play
 from mapspeak.evaluation.scores.answers import NOWHERE
-from mapspeak.evaluation.trials import MAP, MEMORY, STATES, ServerAccess, Setting, Trial
+from mapspeak.evaluation.trials import MAP, MEMORY, STATES, Setting, Trial
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.memory import SemanticMapStore
@@ -38,8 +39,8 @@ LINE_BYTES = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Workshop:
-    """What a workplace is made from.
+class TrialSetup:
+    """What robot and server of a trial are made from.
 
     Attributes:
         world: The world of the trial, without what the setting adds.
@@ -95,7 +96,7 @@ def _usual_options(toolsets: tuple[str, ...], folder: Path, control: Path) -> tu
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workplace:
-    """A connected robot.
+    """A robot that is served.
 
     Attributes:
         client: To its server; None where the agent brings its own.
@@ -107,78 +108,71 @@ class Workplace:
     look: Callable[[], StateRecord]
     command: tuple[str, ...] = ()
 
-    @property
-    def instructions(self) -> str:
-        """What the server tells any model first."""
-        return "" if self.client is None else self.client.instructions or ""
-
 
 @asynccontextmanager
-async def open_workplace(shop: Workshop, connection: ServerAccess) -> AsyncGenerator[Workplace]:
+async def open_workplace(setup: TrialSetup, connection: ServerAccess) -> AsyncGenerator[Workplace]:
     """Start robot and server and connect; in the end the robot's map lies in the folder."""
     for leftover in (STATES, MEMORY, MAP, AUDIT):
-        (shop.folder / leftover).unlink(missing_ok=True)
-    if shop.setting.memory is not None:
-        (shop.folder / MEMORY).write_text(shop.setting.memory, encoding="utf-8")
-    if shop.setting.inspected is not None:
+        (setup.folder / leftover).unlink(missing_ok=True)
+    if setup.setting.memory is not None:
+        (setup.folder / MEMORY).write_text(setup.setting.memory, encoding="utf-8")
+    if setup.setting.inspected is not None:
         opened = open_inspection(
-            shop.setting.inspected, connection, toolsets=shop.toolsets, folder=shop.folder
+            setup.setting.inspected, connection, toolsets=setup.toolsets, folder=setup.folder
         )
     elif connection is ServerAccess.MEMORY:
-        opened = _open_in_memory(shop)
+        opened = _open_in_memory(setup)
     else:
-        log = shop.folder / STATES
-        opened = _open_apart(shop.command(), connection, lambda: _last_state(log))
+        log = setup.folder / STATES
+        opened = _connect(setup.command(), lambda: _last_state(log), connection)
     async with opened as place:
         yield place
 
 
 @asynccontextmanager
-async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
-    setting = shop.setting
-    world = replace(shop.world, objects=(*shop.world.objects, *setting.added))
-    known = None if shop.known_map is None else load_map(shop.known_map).grid
-    simulation = Simulation(world, seed=shop.trial.seed, known=known, start=setting.start)
-    log = StateLog(simulation, shop.folder / STATES)
+async def _open_in_memory(setup: TrialSetup) -> AsyncGenerator[Workplace]:
+    setting = setup.setting
+    world = replace(setup.world, objects=(*setup.world.objects, *setting.added))
+    known = None if setup.known_map is None else load_map(setup.known_map).grid
+    simulation = Simulation(world, seed=setup.trial.seed, known=known, start=setting.start)
+    log = StateLog(simulation, setup.folder / STATES)
     robot = SoloRobot(simulation, has_detector=True, after_step=log.note)
-    memory = SemanticMapStore(shop.folder / MEMORY, map_id=world.name)
-    session = Session(robot, memory, lease_s=math.inf, guard=_build_guard(shop, robot))
+    memory = SemanticMapStore(setup.folder / MEMORY, map_id=world.name)
+    session = Session(robot, memory, lease_s=math.inf, guard=_build_guard(setup, robot))
     server = build_server(
         session,
-        toolsets=shop.toolsets,
+        toolsets=setup.toolsets,
         tools=setting.tools,
-        representation=Representation(shop.trial.representation),
+        representation=Representation(setup.trial.representation),
     )
     try:
         async with _connect(server, lambda: StateRecord.of(simulation)) as place:
             yield place
     finally:
         log.close()
-        write_map(simulation.map(), shop.folder / MAP, mode=MapMode.RAW)
+        write_map(simulation.map(), setup.folder / MAP, mode=MapMode.RAW)
 
 
 @asynccontextmanager
 async def _connect(
-    server: MCPServer | StdioServerParameters, look: Callable[[], StateRecord]
+    server: MCPServer | tuple[str, ...],
+    look: Callable[[], StateRecord],
+    connection: ServerAccess = ServerAccess.STDIO,
 ) -> AsyncGenerator[Workplace]:
-    async with Client(server, read_timeout_seconds=ANSWER_WITHIN_S) as client:
+    """Connect to a server, or to one that a command line starts, or leave that to the agent."""
+    started: MCPServer | StdioServerParameters
+    if isinstance(server, MCPServer):
+        started = server
+    elif connection is ServerAccess.COMMAND:
+        yield Workplace(client=None, look=look, command=server)
+        return
+    else:
+        started = StdioServerParameters(command=server[0], args=list(server[1:]))
+    async with Client(started, read_timeout_seconds=ANSWER_WITHIN_S) as client:
         yield Workplace(client=client, look=look)
 
 
-@asynccontextmanager
-async def _open_apart(
-    command: tuple[str, ...], connection: ServerAccess, look: Callable[[], StateRecord]
-) -> AsyncGenerator[Workplace]:
-    """Start a server as a process of its own, or leave that to the agent."""
-    if connection is ServerAccess.COMMAND:
-        yield Workplace(client=None, look=look, command=command)
-        return
-    parameters = StdioServerParameters(command=command[0], args=list(command[1:]))
-    async with _connect(parameters, look) as place:
-        yield place
-
-
-def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
+def _build_guard(setup: TrialSetup, robot: SimulatedRobot) -> Guard:
     """Return the guard that a served robot has when nobody wrote a policy.
 
     Its clock is the robot's, so that a trial is the same whenever it is run. Nothing watches
@@ -188,10 +182,10 @@ def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
     def robot_clock() -> datetime:
         return CLOCK_ZERO + timedelta(seconds=robot.now_s)
 
-    control, name = shop.control, f"sim:{shop.world.name}"
+    control, name = setup.control, f"sim:{setup.world.name}"
     return Guard(
         policy=Policy(),
-        audit=AuditLog(shop.folder / AUDIT, wall_clock=robot_clock, robot=name),
+        audit=AuditLog(setup.folder / AUDIT, wall_clock=robot_clock, robot=name),
         hold=Hold(control),
         approvals=Approvals(WaitingRoom(control / "approvals"), lambda: robot.now_s),
         wall_clock=robot_clock,
@@ -212,7 +206,7 @@ async def open_inspection(
         if connection is not ServerAccess.MEMORY:
             options = _usual_options(toolsets, folder, folder / CONTROL)
             command = (*SERVE, "--robot", url, "--read-only", *options)
-            async with _open_apart(command, connection, lambda: NOWHERE) as place:
+            async with _connect(command, lambda: NOWHERE, connection) as place:
                 yield place
             return
         async with open_rosbridge_robot(url) as robot:

@@ -11,7 +11,8 @@ from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.objects import findable_kinds
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
 from mapspeak.evaluation.trials import Limits, Score, Setting
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Point
+from mapspeak.places.standing import point_ahead
 from mapspeak.simulator import WorldObject
 
 SIDES = {
@@ -60,7 +61,7 @@ def _draw_beside_pose(draw: Draw) -> Setting:
         yaw_deg = float(random.integers(-17, 19) * 10)
         words, side_deg = SIDES[str(random.choice(list(SIDES)))]
         away_m = float(random.choice(DISTANCES_M))
-        goal = _step(pose.point, math.radians(yaw_deg + side_deg), away_m)
+        goal = point_ahead(pose.point, math.radians(yaw_deg + side_deg), away_m)
         if _is_roomy(site, goal) and _is_open(site, pose.point, goal):
             break
     prompt = (
@@ -107,14 +108,10 @@ def _places_beside(site: GroundTruth) -> list[tuple[WorldObject, str, float, Poi
         at = site.place_of(thing)
         for direction, heading_deg in COMPASS.items():
             for away_m in DISTANCES_M:
-                goal = _step(at, math.radians(heading_deg), away_m)
+                goal = point_ahead(at, math.radians(heading_deg), away_m)
                 if _is_roomy(site, goal) and site.is_in_sight(goal, thing):
                     places.append((thing, direction, away_m, goal))
     return places
-
-
-def _step(point: Point, heading_rad: float, away_m: float) -> Point:
-    return Pose(point.x, point.y, wrap_angle(heading_rad)).transform(Point(away_m, 0.0))
 
 
 def _is_roomy(site: GroundTruth, point: Point) -> bool:

@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,11 +14,20 @@ import anyio
 from anyio.abc import ByteReceiveStream, Process
 
 from mapspeak.errors import LinkError
+from mapspeak.evaluation.agent import (
+    AgentEnd,
+    Assignment,
+    OutOfBudgetError,
+    Picture,
+    ServerAccess,
+    ToolAnswer,
+    ToolClient,
+    Witness,
+)
 from mapspeak.evaluation.agents.command import keeper
-from mapspeak.evaluation.agents.command.program import ALWAYS, AnswerForm, Program, Start
+from mapspeak.evaluation.agents.command.program import ALWAYS, ANSWER, Program
 from mapspeak.evaluation.agents.models.chat import Thinking
-from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient, Witness
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
+from mapspeak.evaluation.trials import TrialState
 
 EVERY_S = 0.1
 MOST_BYTES = 4_000_000
@@ -75,7 +84,9 @@ class ProgramRun:
                 # It forgets itself before it has ended, so it is looked for first.
                 servers = _find_servers(folder.parent)
                 await _end_group(process)
-                await _await_end(servers)
+                # They end by themselves once they have written all they have to write, and are
+                # not killed: their numbers were only read from files.
+                await _await_gone(os.kill, servers, within_s=WRAP_UP_S)
                 # What was written last: nobody is left who could write more.
                 with anyio.move_on_after(1.0):
                     await _collect(process.stdout, self.said)
@@ -156,65 +167,42 @@ class CommandAgent:
             LinkError: The program failed by itself.
         """
         self.check()
-        folder, log = task.folder / "client", task.folder / "calls.jsonl"
+        program, folder, log = self.program, task.folder / "client", task.folder / "calls.jsonl"
+        server, answer = (*task.server, "--call-log", str(log)), folder / ANSWER
         folder.mkdir(parents=True, exist_ok=True)
-        start = Start(
-            prompt="\n\n".join(filter(None, (task.system, task.prompt))),
-            server=(*task.server, "--call-log", str(log)),
-            folder=folder,
-            thinking=self.thinking,
-        )
-        start.write_config(self.program)
+        program.write_config(server, folder)
         log.unlink(missing_ok=True)
-        start.answer.unlink(missing_ok=True)
-        run, variables = ProgramRun(log, tools.witness), _choose_variables(self.program)
-        hidden = _secrets(variables)
+        answer.unlink(missing_ok=True)
+        prompt = "\n\n".join(filter(None, (task.system, task.prompt)))
+        command = program.command_line(
+            prompt=prompt, server=server, folder=folder, thinking=self.thinking
+        )
+        names = (*ALWAYS, *program.environment)
+        variables = {name: os.environ[name] for name in names if name in os.environ}
+        run, wall_s = ProgramRun(log, tools.witness), task.limits.wall_s - WRAP_UP_S
         try:
-            await run.carry_out(
-                start.command(self.program),
-                folder=folder,
-                variables={**variables, **self.program.settings},
-                wall_s=task.limits.wall_s - WRAP_UP_S,
-            )
+            settings = {**variables, **program.settings}
+            await run.carry_out(command, folder=folder, variables=settings, wall_s=wall_s)
         finally:
-            said, complained = _plain(run.said, hidden), _plain(run.complained, hidden)
+            said, complained = _plain(run.said, variables), _plain(run.complained, variables)
             (folder / "stdout.txt").write_text(said, encoding="utf-8")
             (folder / "stderr.txt").write_text(complained, encoding="utf-8")
-        if run.over is not None:
-            return AgentEnd(answer=str(run.over), state=TrialState.OUT_OF_BUDGET)
-        if run.exit_code is None:
-            return AgentEnd(answer="It took too long.", state=TrialState.OUT_OF_BUDGET)
-        self._check_end(run, complained.strip() or said.strip())
-        return self._read(said, start.answer, hidden)
-
-    def _check_end(self, run: ProgramRun, complaint: str) -> None:
-        name = self.program.command[0]
+        if run.over is not None or run.exit_code is None:
+            why = "It took too long." if run.over is None else str(run.over)
+            return AgentEnd(answer=why, state=TrialState.OUT_OF_BUDGET)
         if run.exit_code != 0:
+            complaint = (complained.strip() or said.strip())[-LAST_WORDS:]
             raise LinkError(
-                f"{name} ended with status {run.exit_code}: {complaint[-LAST_WORDS:]}",
+                f"{program.command[0]} ended with status {run.exit_code}: {complaint}",
                 hint="Run it by hand once; it may want a login or other options.",
             )
         if not run.n_heard:
             raise LinkError(
-                f"{name} has called no tool.",
+                f"{program.command[0]} has called no tool.",
                 hint="It may not have found the server; see what it said in the folder client.",
             )
-
-    def _read(self, text: str, file: Path, hidden: Mapping[str, str]) -> AgentEnd:
-        program, said = self.program, None
-        if program.answer is AnswerForm.JSON:
-            said = _read_json(text)
-            answer = program.find_answer(said)
-        elif program.answer is AnswerForm.TEXT:
-            answer = text.strip()
-        else:
-            answer = _plain(file.read_bytes(), hidden).strip() if file.exists() else ""
-        return AgentEnd(
-            answer=answer,
-            n_decisions=program.find_numbers(said, program.turns),
-            n_input_tokens=program.find_numbers(said, program.input_tokens),
-            n_output_tokens=program.find_numbers(said, program.output_tokens),
-        )
+        last_words = answer.read_bytes() if answer.exists() else b""
+        return program.read_end(said, _plain(last_words, variables))
 
 
 def _find_servers(folder: Path) -> tuple[int, ...]:
@@ -229,71 +217,36 @@ def _find_servers(folder: Path) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-async def _await_end(servers: Collection[int]) -> None:
-    """Return when servers have ended, or when it has waited long enough.
-
-    One that has lost its client ends by itself, once it has written what it has to write. It is not
-    killed: its number was only read from a file.
-    """
-    with anyio.move_on_after(WRAP_UP_S):
-        # Nothing tells when processes that are not our children end.
-        while any(map(_is_running, servers)):  # noqa: ASYNC110 - as said
-            await anyio.sleep(0.02)
-
-
-def _is_running(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except OSError:
-        return False
-    return True
-
-
 async def _end_group(process: Process) -> None:
     """End a program, and then whatever is left of it, by its own group."""
     if process.returncode is None:
         process.terminate()
-    with anyio.move_on_after(GRACE_S):
-        # Nothing tells when a group of processes that are not our children is empty.
-        while _signal_group(process.pid, 0):  # noqa: ASYNC110 - as said
-            await anyio.sleep(0.02)
-    _signal_group(process.pid, signal.SIGKILL)
+    await _await_gone(os.killpg, [process.pid], within_s=GRACE_S)
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
     await process.wait()
 
 
-def _signal_group(group: int, number: int) -> bool:
-    """Send a signal to a group; false when nobody is left in it."""
-    try:
-        os.killpg(group, number)
-    except (ProcessLookupError, PermissionError):
-        return False
-    return True
+async def _await_gone(
+    send: Callable[[int, int], None], numbers: Iterable[int], *, within_s: float
+) -> None:
+    """Return when processes or groups have ended, or when it has waited long enough.
+
+    Args:
+        send: Sends a signal to one of them; signal 0 only asks whether it is there.
+    """
+    with anyio.move_on_after(within_s):
+        for number in numbers:
+            with suppress(OSError):
+                while True:  # nothing tells when processes that are not our children end
+                    send(number, 0)
+                    await anyio.sleep(0.02)
 
 
-def _choose_variables(program: Program) -> dict[str, str]:
-    names = (*ALWAYS, *program.environment)
-    return {name: os.environ[name] for name in names if name in os.environ}
-
-
-def _secrets(variables: Mapping[str, str]) -> dict[str, str]:
-    """Return the values that must not be written down, and what is written instead."""
-    return {
-        value: f"[{name}]"
-        for name, value in variables.items()
-        if name not in ALWAYS and len(value) >= LEAST_SECRET
-    }
-
-
-def _plain(data: bytes | bytearray, hidden: Mapping[str, str]) -> str:
+def _plain(data: bytes | bytearray, variables: Mapping[str, str]) -> str:
+    """Return what was written as text, in which names of variables stand for their secrets."""
     text = data.decode("utf-8", "replace")
-    for value, name in hidden.items():
-        text = text.replace(value, name)
+    for name, value in variables.items():
+        if name not in ALWAYS and len(value) >= LEAST_SECRET:
+            text = text.replace(value, f"[{name}]")
     return text
-
-
-def _read_json(text: str) -> object:
-    """Return the JSON object in a text; programs may write lines of their own before it."""
-    try:
-        return json.loads(text[text.index("{") :])
-    except ValueError:
-        return None

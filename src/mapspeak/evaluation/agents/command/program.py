@@ -2,10 +2,11 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,12 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agent import AgentEnd
 from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.settings import read_settings
 
+ANSWER = "answer.txt"
+"""The file for last words."""
 SERVER = "robot"
 """What the server is called in the programs' own settings."""
 ALWAYS = ("PATH", "HOME", "USER", "LANG", "TMPDIR")
@@ -111,52 +115,52 @@ class Program(BaseModel):
                 hint="Leave --thinking away, or describe the program with `thinking: [...]`.",
             )
 
-    def find_numbers(self, said: object, keys: Iterable[str]) -> int | None:
-        """Return the sum of the numbers under some keys; None where there is none."""
-        found = [each for key in keys for each in _find(said, key.split("."))]
-        numbers = [each for each in found if isinstance(each, int | float)]
-        return int(sum(numbers)) if numbers else None
-
-    def find_answer(self, said: object) -> str:
-        """Return the text under the answer's key; empty where there is none."""
-        return next((str(each) for each in _find(said, self.answer_key.split("."))), "")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
-    """What one run of a program is started with: the server is a command line."""
-
-    prompt: str
-    server: tuple[str, ...]
-    folder: Path
-    thinking: Thinking | None
-
-    @property
-    def answer(self) -> Path:
-        """The file for last words."""
-        return self.folder / "answer.txt"
-
-    def command(self, program: Program) -> list[str]:
-        """Return the program's command line."""
+    def command_line(
+        self, *, prompt: str, server: Sequence[str], folder: Path, thinking: Thinking | None
+    ) -> list[str]:
+        """Return what to start in a folder, with the server's own command line."""
         values = {
-            "{prompt}": self.prompt,
-            "{config}": str(self.folder / program.config),
-            "{folder}": str(self.folder),
-            "{answer}": str(self.answer),
-            "{thinking}": self.thinking or "",
-            "{server}": json.dumps(self.server[0]),
-            "{arguments}": json.dumps(self.server[1:]),
+            "{prompt}": prompt,
+            "{config}": str(folder / self.config),
+            "{folder}": str(folder),
+            "{answer}": str(folder / ANSWER),
+            "{thinking}": thinking or "",
+            "{server}": json.dumps(server[0]),
+            "{arguments}": json.dumps(server[1:]),
         }
-        more = () if self.thinking is None else program.thinking
-        return [_fill(part, values) for part in (*program.command, *more)]
+        # In one go: what is filled in is not searched for more to fill in.
+        places = re.compile("|".join(map(re.escape, values)))
+        parts = (*self.command, *(() if thinking is None else self.thinking))
+        return [places.sub(lambda found: values[found[0]], part) for part in parts]
 
-    def write_config(self, program: Program) -> None:
+    def write_config(self, server: Sequence[str], folder: Path) -> None:
         """Write the program's settings, which name the server."""
-        command, *arguments = self.server
-        entry = {"command": command, "args": arguments, **program.server}
-        path = self.folder / program.config
+        command, *arguments = server
+        entry = {"command": command, "args": arguments, **self.server}
+        path = folder / self.config
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps({"mcpServers": {SERVER: entry}}, indent=2), encoding="utf-8")
+
+    def read_end(self, said: str, last_words: str) -> AgentEnd:
+        """Return its answer, and what it tells of its cost.
+
+        Args:
+            said: All that it wrote to standard output.
+            last_words: What the file for them has.
+        """
+        told: object = None
+        answer = (last_words if self.answer is AnswerForm.FILE else said).strip()
+        if self.answer is AnswerForm.JSON:
+            with suppress(ValueError):
+                # Programs may write lines of their own before it.
+                told = json.loads(said[said.index("{") :])
+            answer = next(map(str, _find(told, self.answer_key)), "")
+        return AgentEnd(
+            answer=answer,
+            n_decisions=_find_sum(told, self.turns),
+            n_input_tokens=_find_sum(told, self.input_tokens),
+            n_output_tokens=_find_sum(told, self.output_tokens),
+        )
 
 
 def find_program(name: str) -> Program:
@@ -177,19 +181,18 @@ def find_program(name: str) -> Program:
     )
 
 
-def _fill(text: str, values: Mapping[str, str]) -> str:
-    """Fill in what is to be filled in; the value of one is not searched for another."""
-    name = next((name for name in values if name in text), None)
-    if name is None:
-        return text
-    before, _, after = text.partition(name)
-    return f"{_fill(before, values)}{values[name]}{_fill(after, values)}"
+def _find_sum(told: object, keys: Iterable[str]) -> int | None:
+    """Return the sum of the numbers under some keys; None where there is none."""
+    found = [each for key in keys for each in _find(told, key)]
+    numbers = [each for each in found if isinstance(each, int | float)]
+    return int(sum(numbers)) if numbers else None
 
 
-def _find(said: object, keys: list[str]) -> Iterator[object]:
-    if not keys:
-        yield said
-    elif isinstance(said, dict):
-        first, *others = keys
-        for value in said.values() if first == "*" else [said[first]] if first in said else []:
+def _find(told: object, key: str) -> Iterator[object]:
+    """Yield what lies under a key whose parts are joined by dots; * is any key."""
+    if not key:
+        yield told
+    elif isinstance(told, dict):
+        first, _, others = key.partition(".")
+        for value in told.values() if first == "*" else [told[first]] if first in told else []:
             yield from _find(value, others)

@@ -1,15 +1,44 @@
-"""The port of models: what is said to one, what it says and wants to have called; and a mock."""
+"""The model agent: asks a model, makes the calls it wishes for, until it wishes for none.
 
-import re
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+Calls go through our own client, never through one of the model's library: every call is noted,
+counted and held to the trial's limits in one place, whoever the model is.
+"""
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
-import numpy as np
+import anyio
 from mcp_types import Tool
+from PIL import Image
 
-from mapspeak.evaluation.client import ToolAnswer
+from mapspeak.errors import LinkError
+from mapspeak.evaluation.agent import (
+    AgentEnd,
+    Assignment,
+    OutOfBudgetError,
+    Picture,
+    ServerAccess,
+    ToolAnswer,
+    ToolClient,
+)
+from mapspeak.evaluation.trials import TokenCounts, ToolCall, TrialState, Turn
+
+PIXELS_PER_TOKEN = 750
+"""Anthropic's published rule for pictures of up to 1568 px; other APIs count otherwise."""
+INSTEAD = {
+    TrialState.FINISHED: "",
+    TrialState.GAVE_UP: "The model refused to answer.",
+    TrialState.OUT_OF_BUDGET: (
+        "The model was cut off: it wrote as much as it may, or had too much to read."
+    ),
+}
+"""The answer of a model that ends without a word."""
+WRAP_UP_S = 1.0
+"""So long before its time is up it ends by itself, so that what it has cost is not lost."""
 
 
 class Thinking(StrEnum):
@@ -22,7 +51,7 @@ class Thinking(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToolCallRequest:
+class ToolCallRequest(ToolCall):
     """A call that a model wants made.
 
     Attributes:
@@ -31,41 +60,26 @@ class ToolCallRequest:
     """
 
     id: str
-    tool: str
-    arguments: dict[str, Any] = field(default_factory=dict)
     mistake: str | None = None
 
 
-class Ending(StrEnum):
-    """Why a model says no more in a reply."""
-
-    ITS_OWN = "its own"
-    """It has said what it had to say."""
-    REFUSED = "refused"
-    """The model, or its provider for it, does not want to answer."""
-    CUT_OFF = "cut off"
-    """It has written as much as it may, or has more to read than it can."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
+class Reply(TokenCounts):
     """What a model answers to all that was said.
 
     Attributes:
         calls: Calls that it wants made, in their order; none when it has finished.
-        n_input_tokens: Read, cached ones included; None where the API does not say.
-        n_output_tokens: Written, thoughts included.
+        state: What a reply without calls means: finished by itself, gave up (it refused), or out
+            of budget (it was cut off).
     """
 
     text: str
     calls: tuple[ToolCallRequest, ...] = ()
-    n_input_tokens: int | None = None
-    n_output_tokens: int | None = None
-    ending: Ending = Ending.ITS_OWN
+    state: TrialState = TrialState.FINISHED
 
 
 class ModelConversation(Protocol):
-    """One conversation, which keeps all that was said in it."""
+    """The port of models: one conversation, which keeps all that was said in it."""
 
     async def ask(self) -> Reply:
         """Return the model's answer to all that was said so far.
@@ -80,100 +94,103 @@ class ModelConversation(Protocol):
         ...
 
 
-class ChatModel(Protocol):
-    """A model that can be talked to."""
-
-    def begin(
-        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
-    ) -> ModelConversation:
-        """Begin a conversation.
-
-        Args:
-            seed: Of its draws, where it takes one.
-        """
-        ...
+Begin = Callable[[Assignment, Sequence[Tool]], ModelConversation]
+"""Begins a conversation with a model, which may call some tools."""
 
 
-CHARACTERS_PER_TOKEN = 4
-"""The mock's tokens; it does not read its pictures."""
-IDS = re.compile(r"\b[RCFW]\d+\b")
-POSE = re.compile(r'(?:x |"x":)(-?[\d.]+?), ?(?:y |"y":)(-?[\d.]+?)[,}]')
-MOST_DRIVES = 3
-NEAR_M = 1.0
-ANSWERS = ("1", "unreachable", "12.5 m2", "8.0 m", "A", "none", "1.0, -2.0")
-OPENING: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("I look at the map.", "look_at_map", {}),
-    ("I look ahead.", "look_through_camera", {}),
-    ("I ask for what is not there.", "describe_place", {"place": "R0"}),
-    ("I look at the ROS.", "ros_overview", {}),
-    ("I read a topic.", "ros_read", {"topic": "/tf"}),
-    ("I read what is not there.", "ros_topic", {"topic": "/none"}),
-)
+def estimate_picture_tokens(picture: Picture) -> int:
+    """Estimate what a picture costs: its pixels by 750, whatever the model.
 
-
-def decide(seed: int, *, prompt: str, heard: Sequence[str], tools: Collection[str]) -> Reply:
-    """Return the mock's next reply: it looks, errs once, drives a little, and answers.
-
-    Args:
-        seed: Of its draws.
-        heard: The answers to its calls so far, in their order.
+    No API that we know through `inspect-ai` says what of a request was pictures; this is the same
+    estimate for all of them, and never more than one.
     """
-    is_question = "Answer without driving" in prompt
-    random = np.random.default_rng([seed, len(heard)])
-    n_drives = 0 if is_question else int(np.random.default_rng(seed).integers(1, MOST_DRIVES + 1))
-    place = _choose_place(random, heard[0] if heard else "")
-    opening = [move for move in OPENING if move[1] in tools]
-    if len(heard) < len(opening):
-        text, tool, arguments = opening[len(heard)]
-    elif "navigate_to" in tools and len(heard) < len(opening) + n_drives:
-        text, tool = f"I drive to {place}.", "navigate_to"
-        arguments = {"place": place, "wait_s": 25.0}
-    else:
-        return Reply(text=f"ANSWER: {random.choice(ANSWERS) if is_question else 'there'}")
-    call = ToolCallRequest(id=f"call-{len(heard)}", tool=tool, arguments=arguments)
-    return Reply(text=text, calls=(call,))
-
-
-def _choose_place(random: np.random.Generator, first: str) -> str:
-    """Return an id that it has read first, else a point near the pose that it has read."""
-    ids = sorted(set(IDS.findall(first)))
-    if ids:
-        return str(random.choice(ids))
-    pose = POSE.search(first)
-    x, y = (float(pose[1]), float(pose[2])) if pose else (0.0, 0.0)
-    x, y = np.array([x, y]) + random.uniform(-NEAR_M, NEAR_M, 2)
-    return f"{x:.2f}, {y:.2f}"
+    width_px, height_px = Image.open(io.BytesIO(picture.data)).size
+    return math.ceil(width_px * height_px / PIXELS_PER_TOKEN)
 
 
 @dataclass(slots=True)
-class MockModel:
-    """Answers by the script."""
+class _Account:
+    """What the conversation has cost so far.
 
-    _seed: int = 0
-    _prompt: str = ""
-    _tools: tuple[str, ...] = ()
-    _n_read: int = 0
-    _heard: list[str] = field(default_factory=list)
+    Attributes:
+        n_turns: Times that the model was asked.
+    """
 
-    def begin(
-        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
-    ) -> ModelConversation:
-        """Begin a conversation."""
-        names = tuple(tool.name for tool in tools)
-        return MockModel(seed, prompt, names, _count_tokens(system) + _count_tokens(prompt))
+    n_turns: int = 0
+    spent: TokenCounts = field(default_factory=TokenCounts)
 
-    async def ask(self) -> Reply:
-        """Return what the script says next."""
-        reply = decide(self._seed, prompt=self._prompt, heard=self._heard, tools=self._tools)
-        n_written = _count_tokens(reply.text)
-        return replace(reply, n_input_tokens=self._n_read, n_output_tokens=n_written)
-
-    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
-        """Remember an answer."""
-        del call
-        self._heard.append(answer.text)
-        self._n_read += _count_tokens(answer.text)
+    def end(self, answer: str, state: TrialState) -> AgentEnd:
+        return AgentEnd(
+            answer=answer,
+            state=state,
+            n_decisions=self.n_turns,
+            n_input_tokens=self.spent.n_input_tokens,
+            n_output_tokens=self.spent.n_output_tokens,
+            n_picture_tokens=self.spent.n_picture_tokens or 0,
+        )
 
 
-def _count_tokens(text: str) -> int:
-    return len(text) // CHARACTERS_PER_TOKEN
+@dataclass(frozen=True, slots=True)
+class ModelAgent:
+    """Lets a model work with the tools until it has nothing more to call."""
+
+    begin: Begin
+    name: str
+    connection: ServerAccess = field(default=ServerAccess.STDIO, kw_only=True)
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carry out the assignment; also out of budget it says what it has cost.
+
+        Raises:
+            LinkError: There is nothing to call, or the model cannot be asked or never answered.
+        """
+        listed = await tools.list_tools()
+        if not listed:
+            raise LinkError("The server offers no tools.", hint="Look at --toolsets.")
+        account = _Account()
+        try:
+            with anyio.move_on_after(task.limits.wall_s - WRAP_UP_S):
+                return await _converse(self.begin(task, listed), tools, account)
+        except OutOfBudgetError as error:
+            return account.end(str(error), TrialState.OUT_OF_BUDGET)
+        if not account.n_turns:
+            raise LinkError(
+                f"{self.name} has not answered once in {task.limits.wall_s:.0f} s.",
+                hint="See whether its server answers at all.",
+            )
+        return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
+
+
+async def _converse(
+    conversation: ModelConversation, tools: ToolClient, account: _Account
+) -> AgentEnd:
+    n_picture_tokens = 0  # of all pictures said so far: each request has them all
+    while True:
+        reply = await conversation.ask()
+        turn = Turn(
+            role="agent",
+            # The trial notes the last words.
+            text=reply.text if reply.calls else "",
+            n_input_tokens=reply.n_input_tokens,
+            n_output_tokens=reply.n_output_tokens,
+            n_picture_tokens=n_picture_tokens,
+        )
+        account.n_turns += 1
+        account.spent = account.spent.plus(turn)
+        tools.witness.hear(turn)
+        if not reply.calls:
+            return account.end(reply.text or INSTEAD[reply.state], reply.state)
+        for call in reply.calls:
+            answer = await _make(tools, call)
+            n_picture_tokens += sum(map(estimate_picture_tokens, answer.pictures))
+            conversation.tell(call, answer)
+
+
+async def _make(tools: ToolClient, call: ToolCallRequest) -> ToolAnswer:
+    """Make a call; one that was not written properly counts, and is answered with why."""
+    if call.mistake is None:
+        return await tools.call(call.tool, **call.arguments)
+    answer = ToolAnswer(text=call.mistake, is_error=True)
+    tools.witness.hear_call(call.tool, call.arguments)
+    tools.witness.hear_answer(call.tool, answer)
+    return answer

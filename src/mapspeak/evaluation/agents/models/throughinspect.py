@@ -21,21 +21,20 @@ from inspect_ai.model import (
     ContentText,
     GenerateConfig,
     Model,
-    ModelOutput,
     get_model,
 )
 from inspect_ai.tool import ToolCallError, ToolInfo, ToolParams
 from mcp_types import Tool
 
 from mapspeak.errors import ConfigError, LinkError
+from mapspeak.evaluation.agent import Assignment, ToolAnswer
 from mapspeak.evaluation.agents.models.chat import (
-    Ending,
     ModelConversation,
     Reply,
     Thinking,
     ToolCallRequest,
 )
-from mapspeak.evaluation.client import ToolAnswer
+from mapspeak.evaluation.trials import TrialState
 from mapspeak.installation import shell_command
 
 MOST_RETRIES = 5
@@ -56,9 +55,7 @@ class InspectModel:
     name: str
     thinking: Thinking | None
 
-    def begin(
-        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
-    ) -> ModelConversation:
+    def begin(self, task: Assignment, tools: Sequence[Tool]) -> ModelConversation:
         """Begin a conversation.
 
         Raises:
@@ -67,13 +64,16 @@ class InspectModel:
         config = GenerateConfig(
             max_retries=MOST_RETRIES,
             attempt_timeout=ANSWER_WITHIN_S,
-            seed=seed,
+            seed=task.seed,
             # The library makes a budget of it where a provider counts thoughts in tokens.
             reasoning_effort=None if self.thinking is None else self.thinking.value,
         )
         return _InspectConversation(
             model=self.open(),
-            messages=[ChatMessageSystem(content=system), ChatMessageUser(content=prompt)],
+            messages=[
+                ChatMessageSystem(content=task.system),
+                ChatMessageUser(content=task.prompt),
+            ],
             tools=[_as_info(tool) for tool in tools],
             config=config,
         )
@@ -107,7 +107,14 @@ class _InspectConversation:
     config: GenerateConfig
 
     async def ask(self) -> Reply:
-        output = await self._generate()
+        try:
+            output = await self.model.generate(self.messages, tools=self.tools, config=self.config)
+        except Exception as error:  # each provider has errors of its own, of no common kind
+            raise LinkError(
+                f"{self.model} cannot be asked: {_say_cause(error)}",
+                hint="See the provider's own words; "
+                f"`{shell_command('eval --retry')}` runs what broke again.",
+            ) from error
         # Said again as it is: some providers want their own thoughts back, signed.
         self.messages.append(output.message)
         n_read = n_written = None
@@ -129,18 +136,8 @@ class _InspectConversation:
             ),
             n_input_tokens=n_read,
             n_output_tokens=n_written,
-            ending=_ENDINGS.get(output.stop_reason, Ending.ITS_OWN),
+            state=_ENDINGS.get(output.stop_reason, TrialState.FINISHED),
         )
-
-    async def _generate(self) -> ModelOutput:
-        try:
-            return await self.model.generate(self.messages, tools=self.tools, config=self.config)
-        except Exception as error:  # each provider has errors of its own, of no common kind
-            raise LinkError(
-                f"{self.model} cannot be asked: {_say_cause(error)}",
-                hint="See the provider's own words; "
-                f"`{shell_command('eval --retry')}` runs what broke again.",
-            ) from error
 
     def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
         content: list[Content] = [ContentText(text=answer.text)]
@@ -154,9 +151,9 @@ class _InspectConversation:
 
 
 _ENDINGS = {
-    "content_filter": Ending.REFUSED,
-    "max_tokens": Ending.CUT_OFF,
-    "model_length": Ending.CUT_OFF,
+    "content_filter": TrialState.GAVE_UP,
+    "max_tokens": TrialState.OUT_OF_BUDGET,
+    "model_length": TrialState.OUT_OF_BUDGET,
 }
 """Endings by the library's names."""
 

@@ -5,16 +5,16 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.reading import (
+from mapspeak.evaluation.agent import ToolClient
+from mapspeak.evaluation.agents.reading import (
     DetectedThing,
     MapReading,
     describe_view,
     read_map_text,
     read_sightings,
 )
-from mapspeak.evaluation.trials import AgentEnd, TrialState
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Point, Pose
+from mapspeak.places.standing import point_ahead
 
 WAIT_S = 25.0
 REGION = re.compile(r"\b[RCO]\d+\b")
@@ -43,7 +43,7 @@ class Seen:
         """Where the thing is; None where bearing or range are not known."""
         if self.bearing_rad is None or math.isinf(self.range_m):
             return None
-        return step(self.view.point, self.view.yaw_rad + self.bearing_rad, self.range_m)
+        return point_ahead(self.view.point, self.view.yaw_rad + self.bearing_rad, self.range_m)
 
 
 @dataclass(slots=True)
@@ -114,16 +114,6 @@ class ToolDriver:
         self._n_views += 1
         record = describe_view(self._n_views, place, sightings)
         await self.tools.demand("write_semantic_data", **record)
-
-
-def gave_up(why: str) -> AgentEnd:
-    """Return the end of an agent that cannot go on."""
-    return AgentEnd(answer=why, state=TrialState.GAVE_UP)
-
-
-def step(point: Point, heading_rad: float, away_m: float) -> Point:
-    """Return the point so far from another one, in a direction."""
-    return Pose(point.x, point.y, wrap_angle(heading_rad)).transform(Point(away_m, 0.0))
 
 
 def _seen(record: dict[str, Any], landmark: dict[str, Any]) -> Seen:

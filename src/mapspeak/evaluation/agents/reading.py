@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from mapspeak.errors import MapError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
 UNKNOWN_GREY = 127
@@ -37,6 +37,11 @@ class Row:
         """Return a column as a number; infinite where the table says there is none."""
         match = re.match(r"-?[\d.]+", self.cells[column])
         return float(match.group()) if match else math.inf
+
+    def goal(self) -> Point:
+        """Return where a frontier's row says to go."""
+        x, y = self.cells["go to x, y, yaw"].split(",")[:2]
+        return Point(float(x), float(y))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

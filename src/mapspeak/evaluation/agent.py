@@ -1,0 +1,224 @@
+"""What an agent is, what it is given and how it ends, and the client by which it calls tools.
+
+Every call goes past a witness, which hears the answer too.
+"""
+
+import base64
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Protocol
+
+from mcp.client import Client
+from mcp_types import CallToolResult, ImageContent, TextContent, Tool
+
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.evaluation.trials import Limits, TokenCounts, ToolCall, TrialState, Turn
+
+
+class OutOfBudgetError(MapspeakError):
+    """A call would have gone beyond what was allowed; whoever gave the limits catches it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture in a tool's answer."""
+
+    data: bytes
+    media_type: str
+
+    @property
+    def suffix(self) -> str:
+        """The file name's ending."""
+        return ".jpg" if self.media_type == "image/jpeg" else ".png"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolAnswer:
+    """What a tool answered.
+
+    Attributes:
+        report: The structured part; empty where there is none.
+        is_error: The tool could not do what was asked; the text says why.
+    """
+
+    text: str
+    pictures: tuple[Picture, ...] = ()
+    report: dict[str, Any] = field(default_factory=dict)
+    is_error: bool = False
+
+
+class Witness:
+    """Hears the conversation, and may refuse a call; this one hears nothing and refuses nothing."""
+
+    def hear(self, turn: Turn, pictures: tuple[Picture, ...] = ()) -> None:
+        """Hear what is said, called (before the call is made) or answered (with its pictures).
+
+        Raises:
+            OutOfBudgetError: The call must not be made.
+        """
+
+    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
+        """Hear a call before it is made.
+
+        Raises:
+            OutOfBudgetError: It must not be made.
+        """
+        self.hear(Turn(role="agent", call=ToolCall(tool=tool, arguments=arguments)))
+
+    def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
+        """Hear what was answered."""
+        call = ToolCall(tool=tool, arguments={})
+        turn = Turn(role="tool", text=answer.text, call=call, is_error=answer.is_error)
+        self.hear(turn, answer.pictures)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolClient:
+    """Calls tools over MCP.
+
+    Attributes:
+        client: The connected MCP client; None where the agent reaches the server by itself.
+    """
+
+    client: Client | None
+    witness: Witness = field(default_factory=Witness)
+
+    async def call(self, tool: str, /, **arguments: object) -> ToolAnswer:
+        """Call a tool and return its answer, also when that is an error.
+
+        Raises:
+            LinkError: There is no client.
+            OutOfBudgetError: The witness does not let it be made.
+        """
+        client = self._connected()
+        self.witness.hear_call(tool, arguments)
+        answer = _read(await client.call_tool(tool, arguments))
+        self.witness.hear_answer(tool, answer)
+        return answer
+
+    async def demand(self, tool: str, /, **arguments: object) -> ToolAnswer:
+        """Call a tool that has to succeed.
+
+        Raises:
+            LinkError: It did not; its text says why.
+        """
+        answer = await self.call(tool, **arguments)
+        if answer.is_error:
+            raise LinkError(f"{tool} failed: {answer.text}", hint="See the calls before it.")
+        return answer
+
+    async def list_tools(self) -> list[Tool]:
+        """Return the tools as the server describes them to any model.
+
+        Raises:
+            LinkError: There is no client.
+        """
+        return (await self._connected().list_tools()).tools
+
+    def _connected(self) -> Client:
+        if self.client is None:
+            raise LinkError("No client is connected.", hint="Call through the agent's own program.")
+        return self.client
+
+
+def _read(result: CallToolResult) -> ToolAnswer:
+    pictures = [
+        Picture(base64.b64decode(part.data), part.mime_type)
+        for part in result.content
+        if isinstance(part, ImageContent)
+    ]
+    return ToolAnswer(
+        text="\n".join(part.text for part in result.content if isinstance(part, TextContent)),
+        pictures=tuple(pictures),
+        report=dict(result.structured_content or {}),
+        is_error=bool(result.is_error),
+    )
+
+
+class ServerAccess(StrEnum):
+    """How an agent reaches the robot's server."""
+
+    MEMORY = "memory"
+    """In the trial's own process: for scripts, which need no pipe."""
+    STDIO = "stdio"
+    """Over stdio to `mapspeak serve` in a process of its own, as any client does."""
+    COMMAND = "command"
+    """The agent starts `Assignment.server` itself, through a program of its own; its `ToolClient`
+    has no client, and its calls are counted from the server's audit log."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assignment:
+    """What an agent is given.
+
+    Attributes:
+        system: The server's instructions and the guidance of the task.
+        seed: Of anything it draws.
+        server: The command line of its server, for agents that start it themselves.
+        folder: The trial's; an agent may keep files of its own there.
+    """
+
+    prompt: str
+    system: str
+    limits: Limits
+    seed: int
+    server: tuple[str, ...]
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AgentEnd(TokenCounts):
+    """How an agent ended: finished, gave_up or out_of_budget.
+
+    Attributes:
+        n_decisions: Model turns; None counts the calls.
+    """
+
+    answer: str
+    state: TrialState = TrialState.FINISHED
+    n_decisions: int | None = None
+
+
+def gave_up(why: str) -> AgentEnd:
+    """Return the end of an agent that cannot go on."""
+    return AgentEnd(answer=why, state=TrialState.GAVE_UP)
+
+
+class Agent(Protocol):
+    """Carries out an assignment by calling tools."""
+
+    @property
+    def name(self) -> str:
+        """Return its name, as in `Trial.agent`."""
+        ...
+
+    @property
+    def connection(self) -> ServerAccess:
+        """Say how it reaches the server."""
+        ...
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carry out the assignment.
+
+        Raises:
+            OutOfBudgetError: A call would have gone beyond the limits; let it pass through.
+        """
+        ...
+
+
+Script = Callable[[Assignment, ToolClient], Awaitable[AgentEnd]]
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptAgent:
+    """A script, which reads what tools answer as text, and needs no pipe."""
+
+    name: str
+    script: Script
+    connection: ServerAccess = ServerAccess.MEMORY
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carry out the assignment."""
+        return await self.script(task, tools)
