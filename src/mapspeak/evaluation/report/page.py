@@ -9,8 +9,8 @@ from urllib.parse import quote
 
 from mapspeak.evaluation.report.html import Html, document, element, paragraph, table, text
 from mapspeak.evaluation.report.replay import PAGE, REPLAY, show_standing, write_replay
-from mapspeak.evaluation.scores.rows import Interval, TableRow, count_rows, wilson_interval
-from mapspeak.evaluation.trials import TRIALS, TrialResult, write_whole
+from mapspeak.evaluation.scores.rows import TableRow, count_rows, wilson_interval
+from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, write_whole
 
 MOST_SAID = 240
 """Characters of an error in the list; all of it is in the replay."""
@@ -44,7 +44,6 @@ def write_page(run: Path, results: Sequence[TrialResult]) -> Path:
         "mapspeak: an evaluation",
         element("h1", {}, text("mapspeak: an evaluation")),
         *_show_paper(rows),
-        *_show_success(rows),
         *_list_trials(results),
     )
     for result in results:
@@ -94,47 +93,27 @@ def _coverage(row: TableRow) -> Html:
     return _cell(said or NOT_RUN, f"{row.n_successes}/{row.n_trials} done{_say_broken(row)}")
 
 
-def _show_success(rows: Sequence[TableRow]) -> Iterator[Html]:
-    heading = ("task", "agent", "map shown as", "done", "SPL", "driven m", "calls", "mistakes")
-    yield element("h2", {"id": "success"}, text("Success"))
-    lines = (
-        [
-            _cell(row.task),
-            _cell(row.agent),
-            _cell(row.representation),
-            _share_of(row),
-            *(_mean(row.figures.get(name)) for name in ("spl", "driven_m", "n_calls")),
-            _cell(", ".join(f"{name} {count}" for name, count in row.failures.items())),
-        ]
-        for row in rows
-    )
-    yield table(heading, lines, kind="success")
-
-
 def _list_trials(results: Iterable[TrialResult]) -> Iterator[Html]:
     box = element("input", {"type": "checkbox", "id": "only-failed"})
     label = element("label", {"for": "only-failed"}, text(" only those that were not done"))
     yield element("h2", {"id": "trials"}, text("Every trial"))
     yield element("p", {"class": "choice"}, box, label)
-    heading = ("trial", "", "mistake", "reason", "driven m", "calls", "wall s")
-    yield table(heading, map(_line, results), kind="trials")
+    yield table(("trial", "", "mistake", "reason"), map(_line, results), kind="trials")
 
 
 def _line(result: TrialResult) -> list[Html]:
     failure = result.score.failure
     link = quote(f"{TRIALS}/{result.trial.id}/{REPLAY}")
-    name = element("a", {"href": link}, text(result.trial.id))
     # A trace ends with what went wrong.
     last = ((result.error or "").strip().splitlines() or [result.score.reason])[-1]
     mistake = "" if failure is None else failure.replace("_", " ")
-    if failure is not None and result.state == "out_of_budget":
+    if failure is not None and result.state is TrialState.OUT_OF_BUDGET:
         mistake = f"{mistake}, out of budget"
     return [
-        element("td", {"class": "id"}, name),
+        element("td", {"class": "id"}, element("a", {"href": link}, text(result.trial.id))),
         element("td", {}, show_standing(result)),
         _cell(mistake),
         _cell(last if len(last) <= MOST_SAID else f"{last[:MOST_SAID]}..."),
-        *(_cell(f"{value:g}") for value in (result.driven_m, result.n_calls, result.wall_s)),
     ]
 
 
@@ -149,15 +128,6 @@ def _share(n_successes: int, n_trials: int, more: str = "") -> Html:
         return _cell(NOT_RUN)
     span = f"{_percent(share.low)} to {_percent(share.high)}{more}"
     return _cell(f"{n_successes}/{n_trials} ({_percent(share.value)})", span)
-
-
-def _mean(interval: Interval | None) -> Html:
-    """Return a mean in a cell; equal values, and one alone, have no interval that says anything."""
-    if interval is None:
-        return _cell("")
-    is_sure = interval.low == interval.high
-    span = "" if is_sure else f"{interval.low:.3g} to {interval.high:.3g}"
-    return _cell(f"{interval.value:.3g}", span)
 
 
 def _say_broken(row: TableRow) -> str:

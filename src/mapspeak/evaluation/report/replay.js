@@ -3,7 +3,7 @@
 (() => {
   const steps = [...document.querySelectorAll("ol.steps > li")];
   if (!steps.length) return;
-  const robot = document.querySelector(".robot"), way = document.querySelector(".so-far");
+  const robot = document.querySelector(".robot");
   const make = (tag, fields) => Object.assign(document.createElement(tag), fields);
   const count = make("output"), slider = make("input", { type: "range", min: 0, max: steps.length - 1 });
   let now = 0, isStepping = true;
@@ -19,7 +19,6 @@
     if (robot && place.u !== undefined) {
       robot.setAttribute("transform", `translate(${place.u} ${place.v}) rotate(${place.heading})`);
     }
-    if (way && place.driven !== undefined) way.setAttribute("stroke-dasharray", `${place.driven} 2`);
     if (!isStepping) steps[now].scrollIntoView({ block: "nearest" });
   }
 
