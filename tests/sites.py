@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import Evidence
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import (
     MAP,

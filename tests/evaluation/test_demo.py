@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from mapspeak.cli.simulating import demo
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.reading import read_map_text
+from mapspeak.evaluation.agents.driver import read_map_text
 from mapspeak.evaluation.tasks.catalogue import FAMILIES
 from mapspeak.evaluation.trials import read_results
 from mapspeak.spatial.mapfiles import load_map

@@ -6,7 +6,7 @@ import pytest
 from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.evaluation.agents.reading import read_map_text
+from mapspeak.evaluation.agents.driver import read_map_text
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
 from mapspeak.spatial import OccupancyGrid

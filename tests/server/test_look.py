@@ -10,7 +10,7 @@ from PIL import Image
 
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
-from mapspeak.evaluation.agents.reading import read_map_picture, read_map_text
+from mapspeak.evaluation.agents.driver import read_map_picture, read_map_text
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
 from rosbridge_script import PATIENCE_S

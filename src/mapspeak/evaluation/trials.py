@@ -7,7 +7,6 @@ in one world. On the disk each has a folder, whose result.json comes last.
 import json
 import os
 import re
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -260,7 +259,7 @@ def write_result(run: Path, result: TrialResult) -> None:
     """Write result.json so that it is there whole or not at all."""
     folder = trial_folder(run, result.trial)
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / RESULT, [_RESULT.dump_json(result, indent=2), b"\n"])
+    write_whole(folder / RESULT, _RESULT.dump_json(result, indent=2) + b"\n")
 
 
 def read_result(path: Path) -> TrialResult:
@@ -307,12 +306,12 @@ def say_fault(error: Exception) -> str:
     return lines[0].rstrip(".") if lines else type(error).__name__
 
 
-def write_whole(path: Path, parts: Iterable[bytes]) -> None:
+def write_whole(path: Path, data: bytes) -> None:
     """Put a file in its place whole, so that no reader and no crash ever sees half of it."""
     new = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with new.open("wb") as file:
-            file.writelines(parts)
+            file.write(data)
             file.flush()
             # Else a machine that loses power may keep the name and lose what it stands for.
             os.fsync(file.fileno())

@@ -1,24 +1,14 @@
 """A described ROS system, asked over the wire by our own client of rosbridge."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fakes import two_rooms
 from mapspeak.errors import LinkError
 from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
-from mapspeak.evaluation.inspected.playing import (
-    InspectedSystem,
-    play,
-    with_cut_transform,
-    with_dead_stream,
-    with_late_stream,
-    with_late_transform,
-    with_lost_subscriber,
-    with_parameter,
-    with_second_publisher,
-    without_node,
-    without_subscribers,
-)
+from mapspeak.evaluation.inspected.playing import InspectedSystem, play
 from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages.fields import Dialect, read_header
 from mapspeak.ros.messages.grids import read_grid
@@ -71,7 +61,7 @@ async def test_the_map_is_kept_for_those_who_come_later(dialect: Dialect) -> Non
 @pytest.mark.parametrize("dialect", DIALECTS)
 async def test_types_of_its_own_services_and_parameters_are_told(dialect: Dialect) -> None:
     names, system = drawn(dialect)
-    system = with_parameter(system, names.navigator, "max_speed", 9.5)
+    system = replace(system, parameters={**system.parameters, names.navigator: {"max_speed": 9.5}})
     async with play(system) as url, open_client(RobotAddress(url=url)) as client:
         await client.fetch_graph()
         texts = await client.fetch_definitions(names.device_type)
@@ -84,7 +74,7 @@ async def test_types_of_its_own_services_and_parameters_are_told(dialect: Dialec
 
 async def test_a_dead_stream_is_silent_while_its_node_is_there() -> None:
     names, system = drawn(Dialect.ROS2)
-    system = with_dead_stream(system, names.range)
+    system = system.with_stream(system.stream_on(names.range), rate_hz=0.0)
     async with play(system) as url, open_client(RobotAddress(url=url)) as client:
         heard, alive = client.subscribe(names.range), client.subscribe(names.imu_data)
         await alive.wait_for_more_than(10, timeout_s=PATIENCE_S)
@@ -95,7 +85,7 @@ async def test_a_dead_stream_is_silent_while_its_node_is_there() -> None:
 
 async def test_a_late_stream_is_stamped_in_the_past() -> None:
     names, system = drawn(Dialect.ROS2)
-    system = with_late_stream(system, names.charge, 500.0)
+    system = system.with_stream(system.stream_on(names.charge), lag_s=500.0)
     async with play(system) as url, open_client(RobotAddress(url=url)) as client:
         heard = client.subscribe(names.charge)
         _, stamp_s = read_header(await heard.wait_for_more_than(0, timeout_s=PATIENCE_S))
@@ -104,32 +94,18 @@ async def test_a_late_stream_is_stamped_in_the_past() -> None:
         assert 500.0 <= now_s - stamp_s < 500.0 + PATIENCE_S
 
 
-async def test_a_cut_transform_leaves_those_that_are_told_with_it() -> None:
+async def test_transforms_that_are_told_together_come_together() -> None:
     names, system = drawn(Dialect.ROS2)
-    system = with_cut_transform(system, names.laser_frame)
+    stream = system.stream_to(names.laser_frame)
     async with play(system) as url, open_client(RobotAddress(url=url)) as client:
         heard = client.subscribe("/tf_static")
         told = read_transforms(await heard.wait_for_more_than(0, timeout_s=PATIENCE_S))
-        assert [each.child for each in told] == ["body"]
+        assert [each.child for each in told] == [each.child for each in stream.transforms]
 
 
-def test_faults_of_transforms_leave_the_other_streams_alone() -> None:
+def test_a_node_that_is_gone_does_nothing_any_more() -> None:
     names, system = drawn(Dialect.ROS2)
-    cut = with_cut_transform(system, "odom")
-    late = with_late_transform(system, names.base_frame, 40.0)
-    assert [each.node for each in cut.streams if each.rate_hz == 0] == [names.locator]
-    assert [each.node for each in late.streams if each.lag_s] == [names.motors]
-
-
-def test_faults_of_the_graph_change_what_they_are_named_after() -> None:
-    names, system = drawn(Dialect.ROS2)
-    fighting = with_second_publisher(system, names.velocity, names.joystick)
-    assert fighting.publishers_of(names.velocity) == tuple(sorted((names.smoother, names.joystick)))
-    assert without_subscribers(system, names.range).subscribers_of(names.range) == ()
-    lost = with_lost_subscriber(system, names.locator, names.scan, "/elsewhere")
-    assert lost.subscribers_of("/elsewhere") == (names.locator,)
-    assert names.locator not in lost.subscribers_of(names.scan)
-    gone = without_node(system, names.sonar)
+    gone = system.without_node(names.sonar)
     assert names.sonar not in gone.nodes
     assert gone.publishers_of(names.range) == ()
     assert gone.subscribers_of(names.range) == (names.watcher,)

@@ -1,6 +1,6 @@
 import pytest
 
-from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import Evidence
 from mapspeak.evaluation.tasks.inspecting import InspectionPart, PartKind, judge_parts
 from mapspeak.evaluation.trials import Failure, TrialState
 

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task, task_names
+from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.geometry import Pose
 from mapspeak.server.prompts import read_text
 from mapspeak.simulator import load_world, world_names
@@ -22,7 +22,7 @@ def site_of(world: str) -> GroundTruth:
 @pytest.mark.parametrize("world", world_names())
 def test_tasks_make_settings_that_can_be_carried_out(world: str) -> None:
     site, shift = site_of(world), world_names().index(world)
-    for number, name in enumerate(task_names()):
+    for number, name in enumerate(FAMILIES["all"]):
         task = find_task(name)
         # Each world takes its turn with every fourth task, so that all are tried quickly.
         if (number + shift) % 4 or not task.is_offered(site):

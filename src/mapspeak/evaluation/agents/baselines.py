@@ -8,14 +8,13 @@ import cv2
 import numpy as np
 
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient, gave_up
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label, read_map_picture
 from mapspeak.evaluation.agents.exploring import (
     MARGIN_M,
     SIGHT_M,
     point_of_largest,
     ways_to_floor_m,
 )
-from mapspeak.evaluation.agents.reading import read_map_picture
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Setting

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 
 from mapspeak.evaluation.agent import ToolClient
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
-from mapspeak.evaluation.agents.reading import Row, read_map_picture
+from mapspeak.evaluation.agents.driver import ARRIVED, Row, ToolDriver, read_map_picture
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask

@@ -31,7 +31,7 @@ COMMAND = "command:"
 CLIENT = "openai"
 """The package that inspect-ai speaks through where there is no other; the extra brings it."""
 CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
-"""Packages that it wants besides, by the provider."""
+"""Packages that it speaks through to other providers."""
 SCRIPTS: dict[str, Script] = {
     "scripted": follow_script,
     "random": answer_at_random,
@@ -51,13 +51,8 @@ def check_agent(name: str, thinking: str | None = None) -> None:
     Raises:
         ConfigError: There is no such agent, or something that it needs is missing.
     """
-    amount = read_thinking(thinking)
-    if _is_model(name):
-        _open_model(name, amount).open()
-    elif name.startswith(COMMAND):
-        find_program(name.removeprefix(COMMAND)).check(amount)
-    elif name not in agent_names():
-        raise _no_agent(name)
+    if name != ORACLE:
+        find_agent(name, thinking)
 
 
 def find_agent(
@@ -82,14 +77,12 @@ def find_agent(
     if name == MOCK:
         return ModelAgent(MockModel, name)
     if name.startswith(COMMAND):
-        return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
+        program = find_program(name.removeprefix(COMMAND))
+        program.check(amount)
+        return CommandAgent(program, name, amount)
     if _is_model(name):
-        return ModelAgent(_open_model(name, amount).begin, name)
-    raise _no_agent(name)
-
-
-def _no_agent(name: str) -> ConfigError:
-    return ConfigError(
+        return ModelAgent(_find_model(name, amount).begin, name)
+    raise ConfigError(
         f"There is no agent {name[:80]!r}.",
         hint=f"There are: {', '.join(agent_names())}; "
         "PROVIDER/MODEL for a model, command:PROGRAM for a client program.",
@@ -105,7 +98,7 @@ def _is_model(name: str) -> bool:
     return "/" in name and not name.startswith(COMMAND)
 
 
-def _open_model(name: str, thinking: Thinking | None) -> "InspectModel":
+def _find_model(name: str, thinking: Thinking | None) -> "InspectModel":
     try:
         from mapspeak.evaluation.agents.models.throughinspect import (  # noqa: PLC0415 - an extra
             InspectModel,
@@ -117,7 +110,9 @@ def _open_model(name: str, thinking: Thinking | None) -> "InspectModel":
             f"{name} is asked through inspect-ai, which is not installed.",
             hint=f"{install}, or take the agent mock.",
         ) from error
-    return InspectModel(name, thinking)
+    model = InspectModel(name, thinking)
+    model.open()
+    return model
 
 
 def _find_client(name: str) -> str:

@@ -1,7 +1,7 @@
 """The scripted policy's diagnoses of a ROS, each from what the ros tools answer."""
 
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,18 +13,28 @@ FIELD = re.compile(r"^(\w+): (\S+)", re.MULTILINE)
 PARAMETER = re.compile(r"^(\w+): (-?[\d.]+)(?: |$)", re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class TopicReading:
-    """What ros_topic tells; the node through which we look is left out.
-
-    Attributes:
-        fields: The types of the messages' own fields, by name.
-    """
+    """What ros_topic tells of a topic."""
 
     name: str
-    publishers: tuple[str, ...]
-    subscribers: tuple[str, ...]
-    fields: Mapping[str, str]
+    text: str
+
+    @property
+    def publishers(self) -> list[str]:
+        """The nodes that publish it, but for the one through which we look."""
+        return self._nodes("published by")
+
+    @property
+    def subscribers(self) -> list[str]:
+        """The nodes that hear it, but for the one through which we look."""
+        return self._nodes("heard by")
+
+    def _nodes(self, what: str) -> list[str]:
+        said = _first(rf"(?m)^{what}: (.*)$", self.text).split(", ")
+        # What a node does for us is marked behind its name.
+        named = [each.partition(" ")[0] for each in said]
+        return [each for each in named if each.startswith("/") and each != OURSELVES]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +59,8 @@ class RosReader:
             yield await self.fetch_topic(name)
 
     async def fetch_topic(self, topic: str) -> TopicReading:
-        """Return who publishes a topic, who subscribes to it, and of what fields it is."""
-        text = await self.ask("ros_topic", topic=topic)
-        return TopicReading(
-            name=topic,
-            publishers=_nodes("published by", text),
-            subscribers=_nodes("heard by", text),
-            fields=dict(FIELD.findall(text.partition("heard by: ")[2].partition("\n")[2])),
-        )
+        """Return who publishes a topic, and who subscribes to it."""
+        return TopicReading(topic, await self.ask("ros_topic", topic=topic))
 
     async def fetch_time_s(self) -> float:
         """Return the robot's time; 0 where it does not say."""
@@ -66,13 +70,6 @@ class RosReader:
         """Return what ros_read says of a topic; nothing where nothing came."""
         answer = await self.tools.call("ros_read", topic=topic, **how)
         return "" if answer.is_error else answer.text
-
-
-def _nodes(what: str, text: str) -> tuple[str, ...]:
-    said = re.search(rf"^{what}: (.*)$", text, re.MULTILINE)
-    # What a node does for us is marked behind its name.
-    named = [each.partition(" ")[0] for each in said[1].split(", ")] if said else []
-    return tuple(each for each in named if each.startswith("/") and each != OURSELVES)
 
 
 RATE_OVER_S = 5.0
@@ -128,7 +125,7 @@ async def _say_unheard(reader: RosReader, _question: str) -> str | None:
 
 
 async def _say_missing(reader: RosReader, question: str) -> str | None:
-    launched = _names(_first(r"starts the nodes (.+?)\. One", question))
+    launched = re.findall(NAME, _first(r"starts the nodes (.+?)\. One", question))
     running = (await reader.ask("ros_nodes")).splitlines()[1:]
     missing = [node for node in launched if node not in running]
     async for topic in reader.find_topics():
@@ -139,8 +136,7 @@ async def _say_missing(reader: RosReader, question: str) -> str | None:
 
 async def _say_remap(reader: RosReader, question: str) -> str | None:
     node = _first(rf"yet ({NAME}) gets no scans", question)
-    heard = re.search(r"^hears: (.*)$", await reader.ask("ros_node", node=node), re.MULTILINE)
-    wanted = heard[1].split(", ") if heard else []
+    wanted = _first(r"(?m)^hears: (.*)$", await reader.ask("ros_node", node=node)).split(", ")
     scans = [topic async for topic in reader.find_topics("LaserScan")]
     waits = next((each for each in scans if each.name in wanted and not each.publishers), None)
     comes = next((each for each in scans if each.publishers), None)
@@ -172,7 +168,8 @@ async def _say_service(reader: RosReader, question: str) -> str | None:
 async def _say_type(reader: RosReader, question: str) -> str | None:
     topic = await reader.fetch_topic(_first(rf"messages on ({NAME})", question))
     kind = _first(r"of the type (\w+)\?", question)
-    return ", ".join(name for name, each in topic.fields.items() if each == kind) or None
+    fields = FIELD.findall(topic.text.partition("heard by: ")[2].partition("\n")[2])
+    return ", ".join(name for name, each in fields if each == kind) or None
 
 
 # --- what is published -----------------------------------------------------------------------
@@ -200,7 +197,8 @@ async def _say_rate(reader: RosReader, _question: str) -> str | None:
 
 
 async def _say_silent(reader: RosReader, question: str) -> str | None:
-    for name in _names(_first(r"publish on (.+?)\. Which", question)):
+    names: list[str] = re.findall(NAME, _first(r"publish on (.+?)\. Which", question))
+    for name in names:
         if not await reader.read(name, wait_s=SILENT_AFTER_S):
             return name
     return None
@@ -209,19 +207,19 @@ async def _say_silent(reader: RosReader, question: str) -> str | None:
 async def _say_battery(reader: RosReader, question: str) -> str | None:
     least = float(_first(r"below (\d+) %", question))
     for topic in await reader.list_topics("BatteryState"):
-        match = re.search(r"^percentage: ([\d.]+)", await reader.read(topic), re.MULTILINE)
-        if match is not None:
-            charge = 100 * float(match[1])
+        if share := _first(r"(?m)^percentage: ([\d.]+)", await reader.read(topic)):
+            charge = 100 * float(share)
             return f"{charge:.0f} %, {'charge' if charge < least else 'stay'}"
     return None
 
 
 async def _say_clock(reader: RosReader, question: str) -> str | None:
     lags: list[tuple[float, str]] = []
-    for name in _names(_first(r"publish on (.+?)\. On which", question)):
-        match = re.search(r"stamp: ([\d.]+) s", await reader.read(name))
-        if match is not None:
-            lags.append((await reader.fetch_time_s() - float(match[1]), name))
+    for name in re.findall(NAME, _first(r"publish on (.+?)\. On which", question)):
+        stamp = _first(r"stamp: ([\d.]+) s", await reader.read(name))
+        if stamp:
+            lag_s = await reader.fetch_time_s() - float(stamp)
+            lags.append((lag_s, name))
     return f"{max(lags)[1]}, {max(lags)[0]:.1f} s" if lags else None
 
 
@@ -238,10 +236,6 @@ async def _say_transform(reader: RosReader, question: str) -> str | None:
         if not stamps and not re.search(link, fixed, re.MULTILINE):
             return f"{parent} -> {child}, missing"
     return "whole"
-
-
-def _names(text: str) -> list[str]:
-    return [match.group() for match in re.finditer(NAME, text)]
 
 
 def _first(pattern: str, text: str) -> str:

@@ -9,14 +9,21 @@ from mapspeak.evaluation.agent import (
     AgentEnd,
     Assignment,
     OutOfBudgetError,
-    ToolAnswer,
     ToolClient,
     gave_up,
 )
-from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Seen, ToolDriver, find_label
+from mapspeak.evaluation.agents.driver import (
+    ARRIVED,
+    WAIT_S,
+    MapReading,
+    Row,
+    Seen,
+    ToolDriver,
+    find_label,
+    read_sightings,
+)
 from mapspeak.evaluation.agents.exploring import ScriptedExploration, is_room
 from mapspeak.evaluation.agents.inspecting import diagnose
-from mapspeak.evaluation.agents.reading import MapReading, Row, read_sightings
 from mapspeak.evaluation.trials import TrialState
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.standing import point_ahead
@@ -99,21 +106,17 @@ async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> Agen
     middle = Point(float(match["x"]), float(match["y"]))
     if await driver.drive(x=middle.x, y=middle.y) == ARRIVED:
         return AgentEnd(answer="ANSWER: there")
-    for point in await _aside(driver, middle):
+    room = await driver.find_region(middle)
+    aside = [
+        point_ahead(middle, math.radians(heading_deg), away_m)
+        for away_m in ASIDE_M
+        for heading_deg in COMPASS_DEG.values()
+    ]
+    inside = [point for point in aside if await driver.find_region(point) == room]
+    for point in inside[:MOST_ASIDE]:
         if await driver.drive(x=point.x, y=point.y) == ARRIVED:
             return AgentEnd(answer="ANSWER: there")
     return AgentEnd(answer="ANSWER: unreachable")
-
-
-async def _aside(driver: ToolDriver, middle: Point) -> list[Point]:
-    """Return some points beside another one in the same room."""
-    room = await driver.find_region(middle)
-    points = [
-        point_ahead(middle, math.radians(heading_deg), away_m)
-        for away_m in ASIDE_M
-        for heading_deg in (0.0, 90.0, 180.0, -90.0)
-    ]
-    return [point for point in points if await driver.find_region(point) == room][:MOST_ASIDE]
 
 
 # --- things --------------------------------------------------------------------------------------
@@ -130,16 +133,14 @@ async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
     nearest = await driver.find_nearest(places)
     chosen = next((each for each in near if each.place == nearest), near[0])
     state = await driver.drive(place=chosen.place)
-    is_doubtful = len(seen) == 1
-    if state != ARRIVED or (is_doubtful and not await _is_here(driver, label)):
+    is_found = state == ARRIVED
+    if is_found and len(seen) == 1:
+        is_found = any(label in sighting.label for sighting in await driver.see())
+    if not is_found:
         return await _search(driver, label)
     if chosen.range_m > NEAR_M and chosen.thing is not None:
         await driver.drive(place=f"facing {chosen.thing.x:.2f}, {chosen.thing.y:.2f}")
     return AgentEnd(answer=f"I am at {chosen.place}, from where {label} was seen.")
-
-
-async def _is_here(driver: ToolDriver, label: str) -> bool:
-    return any(label in sighting.label for sighting in await driver.see())
 
 
 async def _search(driver: ToolDriver, label: str) -> AgentEnd:
@@ -155,14 +156,9 @@ async def _search(driver: ToolDriver, label: str) -> AgentEnd:
             return await _approach(driver, label, found[0].bearing_deg, found[0].range_m)
         if answer.report["state"] not in ("driving", "look", "reported"):
             return gave_up(f"There is no {label} to be found: {answer.report['reason']}")
-        answer = await _search_on(driver, label, answer)
+        more = {} if answer.report["state"] == "driving" else {"seen": False}
+        answer = await driver.tools.call(SEARCH, thing=label, **more, wait_s=WAIT_S)
     return gave_up(f"I have looked long enough for a {label}.")
-
-
-async def _search_on(driver: ToolDriver, label: str, answer: ToolAnswer) -> ToolAnswer:
-    if answer.report["state"] == "driving":
-        return await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
-    return await driver.tools.call(SEARCH, thing=label, seen=False, wait_s=WAIT_S)
 
 
 async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
@@ -203,9 +199,8 @@ async def _face_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     thing = _place_of(await driver.recall(match["label"]))
     if thing is None:
         return gave_up(f"I remember no {match['label']}.")
-    return AgentEnd(
-        answer=f"It {await driver.drive(place=f'facing {thing.x:.2f}, {thing.y:.2f}')}."
-    )
+    state = await driver.drive(place=f"facing {thing.x:.2f}, {thing.y:.2f}")
+    return AgentEnd(answer=f"It {state}.")
 
 
 def _place_of(seen: list[Seen]) -> Point | None:
@@ -235,10 +230,9 @@ async def _answer_question(driver: ToolDriver, question: str) -> AgentEnd:
     if "have to drive" in question:
         return await _say_way(driver, question)
     view = await driver.look()
-    choices = {letter: (x, y) for letter, x, y in CHOICE.findall(question)}
-    asked = next(reversed(POINT.findall(question)))
-    region = await _region_at(driver, asked)
-    row = _row_of(view, region)
+    region = await _region_at(driver, POINT.findall(question)[-1])
+    rows = (row for table in view.tables.values() for row in table if "floor m2" in row.cells)
+    row = next((row for row in rows if row.id == region), None)
     if row is None:
         return gave_up(UNTOLD)
     if "square metres" in question:
@@ -248,8 +242,8 @@ async def _answer_question(driver: ToolDriver, question: str) -> AgentEnd:
         return _answer(str(len(doors)))
     beside = [
         letter
-        for letter, point in choices.items()
-        if await _region_at(driver, point) in doors.values()
+        for letter, x, y in CHOICE.findall(question)
+        if await _region_at(driver, (x, y)) in doors.values()
     ]
     return _answer(", ".join(sorted(beside)) or "none")
 
@@ -263,7 +257,7 @@ async def _say_where_to_explore(driver: ToolDriver) -> AgentEnd:
 
 
 async def _say_way(driver: ToolDriver, question: str) -> AgentEnd:
-    x, y = next(iter(POINT.findall(question)))
+    x, y = POINT.findall(question)[0]
     text = (await driver.tools.demand("describe_place", place=f"{x}, {y}")).text
     match = re.search(r"is (\d+(?:\.\d+)?) m away by path", text)
     return gave_up(UNTOLD) if match is None else _answer(f"{match[1]} m")
@@ -271,11 +265,6 @@ async def _say_way(driver: ToolDriver, question: str) -> AgentEnd:
 
 async def _region_at(driver: ToolDriver, point: tuple[str, str]) -> str:
     return await driver.find_region(Point(float(point[0]), float(point[1])))
-
-
-def _row_of(view: MapReading, region: str) -> Row | None:
-    rows = [row for table in view.tables.values() for row in table]
-    return next((row for row in rows if row.id == region and "floor m2" in row.cells), None)
 
 
 def _ways_out(view: MapReading, row: Row) -> dict[str, str]:

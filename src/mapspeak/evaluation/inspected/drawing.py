@@ -8,7 +8,6 @@ import numpy as np
 
 from mapspeak.evaluation.inspected.playing import (
     InspectedSystem,
-    NodeSubscription,
     OfferedService,
     Stream,
 )
@@ -44,7 +43,7 @@ class Names:
 
     `motors` drives the wheels and publishes the odometry, `smoother` hands velocities on to it,
     `locator` finds the robot's place on the map, and `watcher` looks after sensors and battery.
-    `velocity` is the topic that the motors subscribe to, `wish` that of the navigation's
+    `velocity` is the topic that the motors subscribe to, `planned` that of the navigation's
     velocities. `device` is what the robot carries; it publishes `status`, of `device_type`.
     """
 
@@ -75,7 +74,7 @@ class Names:
     joint_states: str = _one_of("/joint_states", "/arm/joint_states")
     map: str = _one_of("/map", "/floor_map", "/building/map", "/static_map")
     velocity: str = _one_of("/cmd_vel", "/base/cmd_vel", "/mobile_base/velocity")
-    wish: str = _one_of("/nav_vel", "/cmd_vel_raw", "/planner/cmd_vel")
+    planned: str = _one_of("/nav_vel", "/cmd_vel_raw", "/planner/cmd_vel")
     status: str = _one_of("/device/status", "/load/state", "/payload")
     device_type: str = _one_of(
         "lift_msgs/LiftStatus", "tray_msgs/TrayState", "dock_msgs/DockReport"
@@ -187,7 +186,7 @@ def _motion(names: Names) -> tuple[Stream, ...]:
         )
     )
     commands = _streams(
-        (names.navigator, names.wish, TWIST, {}, None, 10.0),
+        (names.navigator, names.planned, TWIST, {}, None, 10.0),
         (names.smoother, names.velocity, TWIST, {}, None, 10.0),
         (names.joystick, "/joy", JOY, {"axes": [0.0, 0.0]}, "", 5.0),
         (names.navigator, "/plan", PATH, {}, "map", 1.0),
@@ -199,26 +198,21 @@ def _transform(parent: str, child: str, pose: Pose) -> FrameTransform:
     return FrameTransform(parent_from_child=pose, parent=parent, child=child, stamp_s=0.0)
 
 
-def _subscriptions(names: Names) -> tuple[NodeSubscription, ...]:
-    wanted: dict[str, tuple[tuple[str, str], ...]] = {
-        names.locator: ((names.map, GRID), (names.scan, SCAN), ("/tf_static", TRANSFORMS)),
-        names.navigator: (
-            (names.map, GRID), (names.scan, SCAN), ("/odom", ODOMETRY), ("/tf", TRANSFORMS),
-        ),
-        names.smoother: ((names.wish, TWIST), ("/joy", JOY)),
-        names.motors: ((names.velocity, TWIST),),
-        names.describer: ((names.joint_states, JOINTS),),
-        names.watcher: (
-            (names.imu_data, IMU), (names.range, SONAR), (names.charge, BATTERY),
-            (names.status, names.device_type), ("/plan", PATH),
-            (f"{names.navigator}/local_costmap", GRID),
-        ),
+def _subscriptions(names: Names) -> dict[str, dict[str, str]]:
+    return {
+        names.locator: {names.map: GRID, names.scan: SCAN, "/tf_static": TRANSFORMS},
+        names.navigator: {
+            names.map: GRID, names.scan: SCAN, "/odom": ODOMETRY, "/tf": TRANSFORMS,
+        },
+        names.smoother: {names.planned: TWIST, "/joy": JOY},
+        names.motors: {names.velocity: TWIST},
+        names.describer: {names.joint_states: JOINTS},
+        names.watcher: {
+            names.imu_data: IMU, names.range: SONAR, names.charge: BATTERY,
+            names.status: names.device_type, "/plan": PATH,
+            f"{names.navigator}/local_costmap": GRID,
+        },
     }  # fmt: skip
-    return tuple(
-        NodeSubscription(node=node, topic=topic, type=kind)
-        for node, topics in wanted.items()
-        for topic, kind in topics
-    )
 
 
 def _services(random: np.random.Generator, names: Names) -> tuple[OfferedService, ...]:

@@ -55,15 +55,6 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NodeSubscription:
-    """One node that subscribes to one topic, and the type that it expects."""
-
-    node: str
-    topic: str
-    type: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class OfferedService:
     """One service of a node; its answer is always empty."""
 
@@ -78,6 +69,7 @@ class InspectedSystem:
 
     Attributes:
         started_s: The robot's clock in the beginning.
+        subscriptions: The topics that each node subscribes to, with the types that it expects.
         services: What is offered, besides what every ROS offers.
         parameters: Values by nodes and their own names; each node is named here.
         types: The texts of types that no ROS comes with, by "package/Type".
@@ -86,7 +78,7 @@ class InspectedSystem:
     dialect: Dialect
     started_s: float
     streams: tuple[Stream, ...]
-    subscriptions: tuple[NodeSubscription, ...]
+    subscriptions: Mapping[str, Mapping[str, str]]
     services: tuple[OfferedService, ...] = ()
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     types: Mapping[str, str] = field(default_factory=dict)
@@ -94,14 +86,17 @@ class InspectedSystem:
     @property
     def nodes(self) -> tuple[str, ...]:
         """All nodes by name."""
-        groups = (self.streams, self.subscriptions, self.services)
-        named = {each.node for group in groups for each in group}
-        return tuple(sorted(named | set(self.parameters)))
+        offering = {each.node for each in self.streams} | {each.node for each in self.services}
+        return tuple(sorted(offering | {*self.subscriptions} | {*self.parameters}))
 
     @property
-    def topics(self) -> tuple[str, ...]:
-        """All topics that are published or subscribed to, by name."""
-        return tuple(sorted(self._types()))
+    def topics(self) -> dict[str, str]:
+        """The types of all topics that are published or subscribed to, in the order of names."""
+        types: dict[str, str] = {}
+        for wanted in self.subscriptions.values():
+            types.update(wanted)
+        types.update((each.topic, each.type) for each in self.streams)
+        return dict(sorted(types.items()))
 
     def publishers_of(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish a topic, by name."""
@@ -109,19 +104,36 @@ class InspectedSystem:
 
     def subscribers_of(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that subscribe to a topic, by name."""
-        return tuple(sorted({each.node for each in self.subscriptions if each.topic == topic}))
+        return tuple(sorted(node for node, wanted in self.subscriptions.items() if topic in wanted))
 
     def stream_on(self, topic: str) -> Stream:
         """Return the stream on a topic that has one."""
         return next(each for each in self.streams if each.topic == topic)
 
-    def type_of(self, topic: str) -> str:
-        """Return the type of a topic that is there."""
-        return self._types()[topic]
+    def stream_to(self, child: str) -> Stream:
+        """Return the stream that carries the transform to a frame."""
+        return next(
+            stream
+            for stream in self.streams
+            if any(each.child == child for each in stream.transforms)
+        )
 
-    def _types(self) -> dict[str, str]:
-        wanted = {each.topic: each.type for each in self.subscriptions}
-        return wanted | {each.topic: each.type for each in self.streams}
+    def with_stream(self, stream: Stream, **changes: Any) -> "InspectedSystem":  # noqa: ANN401 - fields of Stream
+        """Return the system with one of its streams changed."""
+        changed = (replace(each, **changes) if each is stream else each for each in self.streams)
+        return replace(self, streams=tuple(changed))
+
+    def without_node(self, node: str) -> "InspectedSystem":
+        """Return the system without a node and all that it does."""
+        return replace(
+            self,
+            streams=tuple(each for each in self.streams if each.node != node),
+            subscriptions={
+                each: wanted for each, wanted in self.subscriptions.items() if each != node
+            },
+            services=tuple(each for each in self.services if each.node != node),
+            parameters={name: each for name, each in self.parameters.items() if name != node},
+        )
 
 
 ROSOUT = "/rosout"
@@ -176,12 +188,12 @@ def _topics_of(system: InspectedSystem) -> list[Topic]:
     topics = [
         Topic(
             name=name,
-            type=system.type_of(name),
+            type=kind,
             is_latched=any(each.topic == name and each.rate_hz is None for each in system.streams),
             publishers=system.publishers_of(name),
             subscribers=system.subscribers_of(name),
         )
-        for name in system.topics
+        for name, kind in system.topics.items()
     ]
     if system.dialect is Dialect.ROS1:
         # The node of that name, which keeps the log, runs beside every master.
@@ -211,80 +223,3 @@ async def _keep_publishing(
 def _publish(played: RosSystem, stream: Stream, now_s: float) -> None:
     message = stream.message(now_s - stream.lag_s, played.dialect)
     played.hub.publish(stream.topic, played.interfaces.fill(stream.type, message))
-
-
-def with_dead_stream(system: InspectedSystem, topic: str) -> InspectedSystem:
-    """Let a topic fall silent; its node still says that it publishes it."""
-    return _change(system, lambda each: each.topic == topic, rate_hz=0.0)
-
-
-def with_late_stream(system: InspectedSystem, topic: str, lag_s: float) -> InspectedSystem:
-    """Set back the clock by which a topic's messages are stamped, by some seconds."""
-    return _change(system, lambda each: each.topic == topic, lag_s=lag_s)
-
-
-def with_late_transform(system: InspectedSystem, child: str, lag_s: float) -> InspectedSystem:
-    """Set back the stamps of the transform to a frame, by some seconds."""
-    return _change(system, lambda each: _carries(each, child), lag_s=lag_s)
-
-
-def with_cut_transform(system: InspectedSystem, child: str) -> InspectedSystem:
-    """End the transform to a frame, and leave those that are told together with it."""
-    stream = next(each for each in system.streams if _carries(each, child))
-    left = tuple(each for each in stream.transforms if each.child != child)
-    if not left:
-        return _change(system, lambda each: each is stream, rate_hz=0.0)
-    return _change(system, lambda each: each is stream, transforms=left)
-
-
-def with_second_publisher(system: InspectedSystem, topic: str, node: str) -> InspectedSystem:
-    """Let one more node publish what a topic carries."""
-    second = replace(system.stream_on(topic), node=node)
-    return replace(system, streams=(*system.streams, second))
-
-
-def with_lost_subscriber(
-    system: InspectedSystem, node: str, topic: str, instead: str
-) -> InspectedSystem:
-    """Let a node subscribe to another topic, without a publisher, instead of the right one."""
-    changed = tuple(
-        replace(each, topic=instead) if (each.node, each.topic) == (node, topic) else each
-        for each in system.subscriptions
-    )
-    return replace(system, subscriptions=changed)
-
-
-def with_parameter(system: InspectedSystem, node: str, name: str, value: float) -> InspectedSystem:
-    """Set a node's parameter to another value."""
-    changed = {**system.parameters[node], name: value}
-    return replace(system, parameters={**system.parameters, node: changed})
-
-
-def without_subscribers(system: InspectedSystem, topic: str) -> InspectedSystem:
-    """Take away all subscriptions of a topic."""
-    left = tuple(each for each in system.subscriptions if each.topic != topic)
-    return replace(system, subscriptions=left)
-
-
-def without_node(system: InspectedSystem, node: str) -> InspectedSystem:
-    """Take away a node with all that it does."""
-    return replace(
-        system,
-        streams=tuple(each for each in system.streams if each.node != node),
-        subscriptions=tuple(each for each in system.subscriptions if each.node != node),
-        services=tuple(each for each in system.services if each.node != node),
-        parameters={name: each for name, each in system.parameters.items() if name != node},
-    )
-
-
-def _carries(stream: Stream, child: str) -> bool:
-    return any(each.child == child for each in stream.transforms)
-
-
-def _change(
-    system: InspectedSystem,
-    is_meant: Callable[[Stream], bool],
-    **changes: Any,  # noqa: ANN401 - fields of Stream
-) -> InspectedSystem:
-    streams = (replace(each, **changes) if is_meant(each) else each for each in system.streams)
-    return replace(system, streams=tuple(streams))

@@ -48,7 +48,7 @@ def write_page(run: Path, results: Sequence[TrialResult]) -> Path:
     )
     for result in results:
         write_replay(run, result)
-    write_whole(run / PAGE, [page])
+    write_whole(run / PAGE, page)
     return run / PAGE
 
 
@@ -89,7 +89,7 @@ def _our_row(agent: str, representation: str, rows: Iterable[TableRow]) -> list[
 def _coverage(row: TableRow) -> Html:
     names = {"paper_ratio": "by the paper's ratio", "recall": "recall", "known_ratio": "known"}
     figures = ((row.figures.get(f"coverage_{name}"), said) for name, said in names.items())
-    said = ", ".join(f"{_percent(value.value)} {name}" for value, name in figures if value)
+    said = ", ".join(f"{_percent(value)} {name}" for value, name in figures if value is not None)
     return _cell(said or NOT_RUN, f"{row.n_successes}/{row.n_trials} done{_say_broken(row)}")
 
 

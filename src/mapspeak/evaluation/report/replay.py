@@ -82,7 +82,7 @@ def write_replay(run: Path, result: TrialResult) -> None:
         *_head(result),
         element("div", {"class": "replay"}, element("div", {"class": "floor"}, floor), said),
     )
-    write_whole(folder / REPLAY, [page])
+    write_whole(folder / REPLAY, page)
 
 
 # --- the map and the way -------------------------------------------------------------------------

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
+from itertools import starmap
 from pathlib import Path
 
 import anyio
@@ -22,7 +23,7 @@ from mapspeak.evaluation.agent import (
 )
 from mapspeak.evaluation.agents.finding import find_agent
 from mapspeak.evaluation.runs.workplace import CONTROL, TrialSetup, open_workplace
-from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import Evidence
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import find_task
 from mapspeak.evaluation.trials import (
@@ -91,7 +92,7 @@ class Transcript(Witness):
         self.n_errors += turn.is_error
         noted = replace(
             turn,
-            pictures=tuple(map(self._keep, pictures)),
+            pictures=tuple(starmap(self._keep, enumerate(pictures))),
             wall_s=round(time.perf_counter() - self._begun_s, 3),
             robot_s=state.time_s,
             pose=state.pose,
@@ -106,11 +107,10 @@ class Transcript(Witness):
         """End the file."""
         self._turns.close()
 
-    def _keep(self, picture: Picture) -> str:
+    def _keep(self, number: int, picture: Picture) -> str:
         self._pictures.mkdir(exist_ok=True)
-        name = f"{self.n_turns:03d}{picture.suffix}"
-        if (self._pictures / name).exists():
-            name = f"{self.n_turns:03d}-{len(list(self._pictures.iterdir()))}{picture.suffix}"
+        more = f"-{number}" if number else ""
+        name = f"{self.n_turns:03d}{more}{picture.suffix}"
         (self._pictures / name).write_bytes(picture.data)
         return name
 

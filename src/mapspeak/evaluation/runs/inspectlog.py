@@ -30,9 +30,8 @@ def write_log(
         versions: Of everything that took part, by name.
         is_whole: All that was asked for has a result.
     """
-    path, new = run / LOG, run / f".{LOG}"
+    new, summaries = run / f".{LOG}", []
     with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as log:
-        summaries = []
         for result in results:
             sample = _sample(run, result)
             name = f"samples/{sample['id']}_epoch_{sample['epoch']}.json"
@@ -41,8 +40,7 @@ def write_log(
         log.writestr("summaries.json", json.dumps(summaries))
         header = _header(results, versions, is_whole=is_whole)
         log.writestr("header.json", json.dumps(header))
-    new.replace(path)
-    return path
+    return new.replace(run / LOG)
 
 
 def _header(
@@ -82,10 +80,8 @@ def _header(
 
 def _sample(run: Path, result: TrialResult) -> dict[str, Any]:
     trial, score = result.trial, result.score
-    figures = {
-        name: getattr(result, name)
-        for name in ("driven_m", "shortest_m", "robot_s", "wall_s", "cpu_s", "n_calls")
-    }
+    shown = ("driven_m", "shortest_m", "robot_s", "wall_s", "cpu_s", "n_calls")
+    figures = {name: getattr(result, name) for name in shown}
     usage = {}
     if result.n_input_tokens is not None and result.n_output_tokens is not None:
         n_read, n_written = result.n_input_tokens, result.n_output_tokens
@@ -121,10 +117,9 @@ def _sample(run: Path, result: TrialResult) -> dict[str, Any]:
 
 
 def _summary(sample: Mapping[str, Any]) -> dict[str, Any]:
-    names = ("id", "epoch", "uuid", "input", "target", "metadata", "scores", "model_usage")
+    kept = ("id", "epoch", "uuid", "input", "target", "metadata", "scores", "model_usage")
     return {
-        **{name: sample[name] for name in names},
-        "total_time": sample["total_time"],
+        **{name: sample[name] for name in (*kept, "total_time")},
         "message_count": len(sample["messages"]),
         "completed": True,
         **({"error": sample["error"]["message"]} if "error" in sample else {}),
@@ -135,39 +130,26 @@ def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
     """Yield the conversation; a call and its answer have the same id."""
     pictures = trial_folder(run, trial) / PICTURES
     for number, turn in enumerate(read_turns(run, trial)):
-        message_id = _id_of(f"{trial.id} {number}")
+        message: dict[str, Any] = {"id": _id_of(f"{trial.id} {number}"), "content": turn.text}
         if turn.role in ("system", "user"):
-            yield {"id": message_id, "role": turn.role, "content": turn.text}
+            message["role"] = turn.role
         elif turn.role == "tool":
-            yield {
-                "id": message_id,
-                "role": "tool",
-                "content": [{"type": "text", "text": turn.text}, *_images(turn, pictures)],
-                "tool_call_id": f"call-{number - 1}",
-                "function": "" if turn.call is None else turn.call.tool,
-                **({"error": {"type": "unknown", "message": turn.text}} if turn.is_error else {}),
-            }
+            message["role"] = "tool"
+            message["content"] = [{"type": "text", "text": turn.text}, *_images(turn, pictures)]
+            message["tool_call_id"] = f"call-{number - 1}"
+            message["function"] = "" if turn.call is None else turn.call.tool
+            if turn.is_error:
+                message["error"] = {"type": "unknown", "message": turn.text}
         else:
-            calls = _calls(turn, number)
-            yield {
-                "id": message_id,
-                "role": "assistant",
-                "content": turn.text,
-                **({"tool_calls": calls} if calls else {}),
-            }
-
-
-def _calls(turn: Turn, number: int) -> list[dict[str, Any]]:
-    call = turn.call
-    if call is None:
-        return []
-    said = {"function": call.tool, "arguments": call.arguments}
-    return [{"id": f"call-{number}", "type": "function", **said}]
+            message["role"] = "assistant"
+            if turn.call is not None:
+                call = {"function": turn.call.tool, "arguments": turn.call.arguments}
+                message["tool_calls"] = [{"id": f"call-{number}", "type": "function", **call}]
+        yield message
 
 
 def _images(turn: Turn, pictures: Path) -> Iterator[dict[str, Any]]:
-    for name in turn.pictures:
-        path = pictures / name
+    for path in (pictures / name for name in turn.pictures):
         if path.is_file():
             media_type = "image/jpeg" if path.suffix == ".jpg" else "image/png"
             data = base64.b64encode(path.read_bytes()).decode()

@@ -109,23 +109,18 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
             folder.
     """
     tasks = choose_tasks(options.tasks)
-    trials = tuple(
-        trial
-        for name, world in worlds.items()
-        for site in (GroundTruth(world),)
-        for task in tasks
-        if task.is_offered(site)
-        for trial in _trials_of(options, task, name)
-    )
+    trials: list[Trial] = []
+    for name, world in worlds.items():
+        site = GroundTruth(world)
+        for task in tasks:
+            if task.is_offered(site):
+                trials += _trials_of(options, task, name)
     if not trials:
         asked = ", ".join(task.name for task in tasks)
         raise ConfigError(f"No world has what {asked} asks about.", hint="Choose other worlds.")
-    needed = {
-        trial.world: prepare_world(options, trial.world)
-        for trial in trials
-        if find_task(trial.task).needs_map
-    }
-    preparations = tuple(each for each in needed.values() if each not in trials)
+    on_maps = dict.fromkeys(each.world for each in trials if find_task(each.task).needs_map)
+    needed = (prepare_world(options, world) for world in on_maps)
+    preparations = tuple(each for each in needed if each not in trials)
     _check_ids((*preparations, *trials))
     versions = {
         "mapspeak": __version__,
@@ -133,7 +128,7 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
         "numpy": np.__version__,
         **find_versions(options.agents),
     }
-    return RunPlan(trials=trials, preparations=preparations, versions=versions)
+    return RunPlan(trials=tuple(trials), preparations=preparations, versions=versions)
 
 
 def _trials_of(options: RunOptions, task: Task, world: str) -> Iterator[Trial]:

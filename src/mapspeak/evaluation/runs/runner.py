@@ -13,7 +13,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import wait
@@ -37,6 +37,7 @@ from mapspeak.evaluation.trials import (
     TrialState,
     find_result,
     read_result,
+    say_fault,
     trial_folder,
     write_result,
 )
@@ -240,11 +241,10 @@ def _find_earlier(run: Path, trial: Trial) -> TrialResult | None:
     try:
         result = read_result(path)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        if first["type"] == "json_invalid":
+        if error.errors(include_url=False)[0]["type"] == "json_invalid":
             return None
         raise ConfigError(
-            f"{path} is no result: {'.'.join(map(str, first['loc']))}: {first['msg']}.",
+            f"{path} is no result: {say_fault(error)}.",
             hint="Use the mapspeak that wrote it, or delete it to run that trial again.",
         ) from error
     if result.trial != trial:
@@ -324,39 +324,33 @@ def _write_broken(run: Path, job: TrialJob, state: TrialState, error: str) -> Tr
 
 def _work_apart(work: Callable[[], object], errors: Path) -> None:
     """Do the work; what it says goes to a file, and it ends when the run does."""
-    _end_with_parent()
+    if (parent := multiprocessing.parent_process()) is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
     # Ctrl-C in a terminal reaches all processes; what becomes of a trial is the run's to say.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with errors.open("w", encoding="utf-8") as said:
         os.dup2(said.fileno(), 1)
         os.dup2(said.fileno(), 2)
+    status = 0
     try:
         work()
     except BaseException as error:  # noqa: BLE001 - the process's last words, for the result
         leaves = _leaves(error)
-        if any(isinstance(leaf, OSError) and leaf.errno in NO_ROOM for leaf in leaves):
-            os._exit(FULL_DISK)
+        is_full = any(isinstance(leaf, OSError) and leaf.errno in NO_ROOM for leaf in leaves)
+        status = FULL_DISK if is_full else 1
         # What we raise on purpose says what to do; anything else is a bug, and needs its trace.
         is_ours = all(isinstance(leaf, MapspeakError) for leaf in leaves)
         sys.stderr.write("\n".join(map(str, leaves)) if is_ours else traceback.format_exc())
+    with suppress(OSError):
         sys.stderr.flush()
-        os._exit(1)
-    sys.stderr.flush()
     # Nothing here is worth an orderly end: threads may wait for what never comes.
-    os._exit(0)
+    os._exit(status)
 
 
-def _end_with_parent() -> None:
+def _end_with(parent: int) -> None:
     """End this process when the run's process is gone: nobody would read its result."""
-    parent = multiprocessing.parent_process()
-    if parent is None:
-        return
-
-    def watch() -> None:
-        wait([parent.sentinel])
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    wait([parent])
+    os._exit(1)
 
 
 def _leaves(error: BaseException) -> list[BaseException]:

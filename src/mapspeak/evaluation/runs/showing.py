@@ -176,12 +176,11 @@ def _make_progress(is_quiet: bool, *columns: ProgressColumn) -> Progress:  # noq
 def build_table(rows: Sequence[TableRow]) -> Table:
     """Return the rows as a table for the terminal, without columns that say nothing."""
     headings = ("task", "agent", "map shown as", "done", "95 %", *SHOWN.values())
-    headings = (*headings, "broken", "failures")
-    cells = [_cells_of(row) for row in rows]
-    kept = [column for column in range(len(headings)) if any(row[column] for row in cells)]
-    table = Table(*(Column(headings[column], overflow="fold") for column in kept))
-    for row in cells:
-        table.add_row(*(row[column] for column in kept))
+    columns = zip((*headings, "broken", "failures"), *map(_cells_of, rows), strict=True)
+    kept = [column for column in columns if any(column[1:])]
+    table = Table(*(Column(heading, overflow="fold") for heading, *_ in kept))
+    for row in list(zip(*kept, strict=True))[1:]:
+        table.add_row(*row)
     return table
 
 
@@ -195,7 +194,7 @@ def _cells_of(row: TableRow) -> tuple[str, ...]:
         row.representation,
         f"{row.n_successes}/{row.n_trials}",
         span,
-        *("" if figure is None else f"{figure.value:.3g}" for figure in figures),
+        *("" if figure is None else f"{figure:.3g}" for figure in figures),
         str(row.n_broken or ""),
         ", ".join(f"{failure} {count}" for failure, count in row.failures.items()),
     )

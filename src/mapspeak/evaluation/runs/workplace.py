@@ -16,7 +16,7 @@ from mcp.server.mcpserver import MCPServer
 
 from mapspeak.evaluation.agent import ServerAccess
 from mapspeak.evaluation.inspected.playing import InspectedSystem, play
-from mapspeak.evaluation.scores.answers import NOWHERE
+from mapspeak.evaluation.scores.judging import NOWHERE
 from mapspeak.evaluation.trials import MAP, MEMORY, STATES, Setting, Trial
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot

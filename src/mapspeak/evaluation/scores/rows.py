@@ -1,18 +1,20 @@
-"""Rows of a table: trials of one task, agent and representation, and how sure the figures are."""
+"""Rows of a table: trials of one task, agent and representation, and how sure their success is."""
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from statistics import NormalDist
-
-import numpy as np
+from statistics import NormalDist, fmean
 
 from mapspeak.evaluation.scores.judging import spl
 from mapspeak.evaluation.trials import Failure, TrialResult
 
 CONFIDENCE = 0.95
-N_RESAMPLES = 2000
+COUNTED = (
+    *("n_input_tokens", "n_output_tokens", "n_picture_tokens", "driven_m", "n_calls"),
+    *("n_decisions", "n_errors", "n_collisions", "robot_s", "wall_s", "cpu_s"),
+)
+"""The numbers of a result that a mean says something about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +37,6 @@ def wilson_interval(n_successes: int, n_trials: int) -> Interval | None:
     return Interval(share, max(middle - half, 0.0), min(middle + half, 1.0))
 
 
-def bootstrap_interval(values: Sequence[float], *, seed: int = 0) -> Interval | None:
-    """Return the mean with its bootstrap interval (Efron, 1979); None without values."""
-    if not values:
-        return None
-    sample = np.asarray(values, dtype=np.float64)
-    chosen = np.random.default_rng(seed).integers(sample.size, size=(N_RESAMPLES, sample.size))
-    means = sample[chosen].mean(axis=1)
-    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]).tolist()
-    return Interval(float(sample.mean()), low, high)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableRow:
     """What came of the trials of one kind.
@@ -62,7 +53,7 @@ class TableRow:
     n_trials: int
     n_successes: int
     n_broken: int
-    figures: dict[str, Interval]
+    figures: dict[str, float]
     failures: dict[Failure, int]
 
 
@@ -79,10 +70,6 @@ def count_rows(results: Iterable[TrialResult]) -> tuple[TableRow, ...]:
 def _count(task: str, agent: str, representation: str, *, results: list[TrialResult]) -> TableRow:
     whole = [_figures_of(result) for result in results if not result.state.is_broken]
     names = dict.fromkeys(name for figures in whole for name in figures)
-    intervals = {
-        name: bootstrap_interval([figures[name] for figures in whole if name in figures])
-        for name in names
-    }
     failures = (result.score.failure for result in results)
     return TableRow(
         task=task,
@@ -91,32 +78,20 @@ def _count(task: str, agent: str, representation: str, *, results: list[TrialRes
         n_trials=len(results),
         n_successes=sum(result.score.is_success for result in results),
         n_broken=len(results) - len(whole),
-        figures={name: each for name, each in intervals.items() if each is not None},
+        figures={
+            name: fmean(figures[name] for figures in whole if name in figures) for name in names
+        },
         failures=dict(Counter(failure for failure in failures if failure is not None)),
     )
 
 
 def _figures_of(result: TrialResult) -> dict[str, float]:
     """Return every number of a result that a mean says something about."""
-    optional = {
-        "n_input_tokens": result.n_input_tokens,
-        "n_output_tokens": result.n_output_tokens,
-        "n_picture_tokens": result.n_picture_tokens,
-        "spl": spl(
-            is_success=result.score.is_success,
-            shortest_m=result.shortest_m,
-            driven_m=result.driven_m,
-        ),
-    }
-    return {
-        **result.score.figures,
-        **{name: float(value) for name, value in optional.items() if value is not None},
-        "driven_m": result.driven_m,
-        "n_calls": float(result.n_calls),
-        "n_decisions": float(result.n_decisions),
-        "n_errors": float(result.n_errors),
-        "n_collisions": float(result.n_collisions),
-        "robot_s": result.robot_s,
-        "wall_s": result.wall_s,
-        "cpu_s": result.cpu_s,
-    }
+    weighted = spl(
+        is_success=result.score.is_success,
+        shortest_m=result.shortest_m,
+        driven_m=result.driven_m,
+    )
+    counted = {name: getattr(result, name) for name in COUNTED} | {"spl": weighted}
+    known = {name: float(value) for name, value in counted.items() if value is not None}
+    return {**result.score.figures, **known}

@@ -90,13 +90,12 @@ class GroundTruth:
         n_pieces, labels, stats, _ = cv2.connectedComponentsWithStats(
             is_wide.view(np.uint8), connectivity=4
         )
+        standable = self.floor.standable
         if n_pieces <= 2:
-            return self.floor.standable
+            return standable
         main = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
-        pieces = np.where(labels == main, _MAIN, np.where(is_wide, _CUT_OFF, _NOWHERE))
-        return np.asarray(_grow(pieces.astype(np.uint8), self.floor.standable) != _CUT_OFF) & (
-            self.floor.standable
-        )
+        pieces = np.select([labels == main, is_wide], [_MAIN, _CUT_OFF], _NOWHERE).astype(np.uint8)
+        return np.asarray(standable & (_grow(pieces, standable) != _CUT_OFF))
 
     @cached_property
     def reachable(self) -> Mask:
@@ -277,10 +276,8 @@ class GroundTruth:
         reach = np.linspace(0.0, 1.0, _N_SAMPLES) * np.clip(1 - _OWN_SIZE_M / away_m, 0, 1)[:, None]
         xs = places[:, :1] + reach * (point.x - places[:, :1])
         ys = places[:, 1:] + reach * (point.y - places[:, 1:])
-        at_rows, at_cols = grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
-        at_rows, at_cols = at_rows.clip(0, grid.n_rows - 1), at_cols.clip(0, grid.n_cols - 1)
-        is_free = ~grid.occupied[at_rows, at_cols].reshape(xs.shape)
-        is_seen = is_free.all(axis=1)
+        is_hidden = grid.look_up(grid.occupied, np.stack([xs, ys], axis=2), outside=False)
+        is_seen = ~is_hidden.any(axis=1)
         found[rows[is_seen], cols[is_seen]] = True
         return found
 
@@ -293,10 +290,9 @@ class GroundTruth:
         """The floor between the walls of every space, by its name."""
         walls = TrueFloor(replace(self.world, objects=())).solid
         rows, cols = np.nonzero(self._labels)
-        at_rows, at_cols = walls.cells_at(self.grid.points_at(rows, cols))
-        is_inside = walls.contains_cells(at_rows, at_cols)
-        is_free = ~walls.occupied[at_rows[is_inside], at_cols[is_inside]]
-        labels = self._labels[rows[is_inside], cols[is_inside]][is_free]
+        points = self.grid.points_at(rows, cols)
+        is_free = ~walls.look_up(walls.occupied, points, outside=True)
+        labels = self._labels[rows[is_free], cols[is_free]]
         n_free = np.bincount(labels, minlength=len(self._label_of) + 1) * self.grid.resolution_m**2
         return {name: float(n_free[label]) for name, label in self._label_of.items()}
 

@@ -10,13 +10,12 @@ from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.scores.judging import judge_coverage
-from mapspeak.evaluation.tasks.blocked import BLOCKED_TASKS
+from mapspeak.evaluation.tasks.failures import FAILURE_TASKS
 from mapspeak.evaluation.tasks.inspections import INSPECTION_TASKS
 from mapspeak.evaluation.tasks.objects import OBJECT_TASKS
 from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
 from mapspeak.evaluation.tasks.relations import RELATION_TASKS, ROUTE_TASK
 from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
-from mapspeak.evaluation.tasks.spoiled import MEMORY_TASKS
 from mapspeak.evaluation.tasks.task import Draw, Task
 from mapspeak.evaluation.trials import Limits, Setting
 from mapspeak.server.prompts import read_text
@@ -44,7 +43,6 @@ EXPLORE_TASK = Task(
     needs_map=False,
 )
 
-FAILURE_TASKS = (*BLOCKED_TASKS, *MEMORY_TASKS)
 _ALL = (
     EXPLORE_TASK,
     *ROOM_TASKS,
@@ -72,11 +70,6 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 """Groups of tasks; the paper's three in the paper's order."""
-
-
-def task_names() -> tuple[str, ...]:
-    """Return the names of all tasks."""
-    return tuple(_TASKS)
 
 
 def find_task(name: str) -> Task:

@@ -7,7 +7,7 @@ from enum import StrEnum
 
 from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
 from mapspeak.evaluation.inspected.playing import InspectedSystem
-from mapspeak.evaluation.scores.answers import Evidence, no_answer, read_said, verdict
+from mapspeak.evaluation.scores.judging import Evidence, no_answer, read_said, verdict
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting

@@ -1,18 +1,8 @@
 """The questions about a ROS: its graph, its messages, its transforms."""
 
+from dataclasses import replace
 from itertools import pairwise
 
-from mapspeak.evaluation.inspected.playing import (
-    with_cut_transform,
-    with_dead_stream,
-    with_late_stream,
-    with_late_transform,
-    with_lost_subscriber,
-    with_parameter,
-    with_second_publisher,
-    without_node,
-    without_subscribers,
-)
 from mapspeak.evaluation.tasks.inspecting import (
     Case,
     InspectionPart,
@@ -47,7 +37,8 @@ def _ask_fight(case: Case) -> Setting:
     """Let two nodes publish velocities for the motors."""
     names = case.names
     intruder = case.draw.one_of((names.joystick, names.navigator, names.device, names.watcher))
-    system = with_second_publisher(case.system, names.velocity, intruder)
+    second = replace(case.system.stream_on(names.velocity), node=intruder)
+    system = replace(case.system, streams=(*case.system.streams, second))
     return case.ask(
         "The robot jerks to and fro as if two drivers held its wheel. Which two nodes both "
         "send velocities to the motors?",
@@ -62,11 +53,15 @@ def _ask_unheard(case: Case) -> Setting:
     names = case.names
     topics = (names.imu_data, names.range, names.charge, names.joint_states, names.status, "/plan")
     topic = case.draw.one_of(topics)
+    left = {
+        node: {each: kind for each, kind in wanted.items() if each != topic}
+        for node, wanted in case.system.subscriptions.items()
+    }
     return case.ask(
         "One topic is published and no node hears it. Which one?",
         "/topic",
         (_name(topic),),
-        without_subscribers(case.system, topic),
+        replace(case.system, subscriptions=left),
     )
 
 
@@ -90,7 +85,7 @@ def _ask_missing(case: Case) -> Setting:
         "Which one, and which topic do others wait for in vain for want of it?",
         "/node, /topic",
         (_name(node), _name(topic)),
-        without_node(case.system, node),
+        case.system.without_node(node),
     )
 
 
@@ -99,12 +94,14 @@ def _ask_remap(case: Case) -> Setting:
     names = case.names
     node = case.draw.one_of((names.locator, names.navigator))
     wrong = case.draw.one_of((f"{names.scan}_filtered", f"/robot{names.scan}", "/laser_scan"))
+    wanted = dict(case.system.subscriptions[node])
+    wanted[wrong] = wanted.pop(names.scan)
     return case.ask(
         f"The laser scanner works, yet {node} gets no scans. On which topic does it wait for "
         "them, and on which do they come?",
         "/waits_here, /they_come_here",
         (_name(wrong), _name(names.scan)),
-        with_lost_subscriber(case.system, node, names.scan, wrong),
+        replace(case.system, subscriptions={**case.system.subscriptions, node: wanted}),
     )
 
 
@@ -114,13 +111,14 @@ def _ask_parameter(case: Case) -> Setting:
     numbers = {name: value for name, value in right.items() if isinstance(value, float)}
     wrong = case.draw.one_of(tuple(numbers))
     value = round(numbers[wrong] * case.draw.one_of(OFF_BY), 3)
+    parameters = {**case.system.parameters, node: {**right, wrong: value}}
     sheet = ", ".join(f"{name} {numbers[name]:g}" for name in case.draw.shuffled((*numbers,)))
     return case.ask(
         f"By the robot's data sheet the parameters of {node} are: {sheet}. One of them is set "
         "otherwise. Which one, and to what?",
         "parameter, 0.5",
         (_name(wrong), _number(f"{value:g}", 0.001 * abs(value))),
-        with_parameter(case.system, node, wrong, value),
+        replace(case.system, parameters=parameters),
     )
 
 
@@ -192,7 +190,7 @@ def _ask_silent(case: Case) -> Setting:
         f"The sensors publish on {', '.join(sorted(sensors))}. Which topic is silent?",
         "/topic",
         (_name(topic),),
-        with_dead_stream(case.system, topic),
+        case.system.with_stream(case.system.stream_on(topic), rate_hz=0.0),
     )
 
 
@@ -228,7 +226,7 @@ def _ask_clock(case: Case) -> Setting:
             _name(topic),
             _number(f"{lag_s:g} s", LAG_S + LAG_RATIO * lag_s),
         ),
-        with_late_stream(case.system, topic, lag_s),
+        case.system.with_stream(case.system.stream_on(topic), lag_s=lag_s),
     )
 
 
@@ -249,17 +247,17 @@ def _ask_transform(case: Case) -> Setting:
         return case.ask(text, form, (InspectionPart(PartKind.WORD, WHOLE),))
     kind, (parent, child) = faults[number]
     lag_s = float(case.draw.random.integers(20, 90))
-    return case.ask(
-        text,
-        form,
-        (
-            InspectionPart(PartKind.LINK, f"{parent} -> {child}"),
-            InspectionPart(PartKind.WORD, kind),
-        ),
-        with_cut_transform(case.system, child)
-        if kind == MISSING
-        else with_late_transform(case.system, child, lag_s),
+    stream = case.system.stream_to(child)
+    changes: dict[str, object] = {"lag_s": lag_s}
+    if kind == MISSING:
+        # Those that are told together with it are left.
+        left = tuple(each for each in stream.transforms if each.child != child)
+        changes = {"transforms": left} if left else {"rate_hz": 0.0}
+    parts = (
+        InspectionPart(PartKind.LINK, f"{parent} -> {child}"),
+        InspectionPart(PartKind.WORD, kind),
     )
+    return case.ask(text, form, parts, case.system.with_stream(stream, **changes))
 
 
 def _name(name: str) -> InspectionPart:
@@ -270,19 +268,22 @@ def _number(said: str, tolerance: float) -> InspectionPart:
     return InspectionPart(PartKind.NUMBER, said, tolerance)
 
 
-INSPECTION_TASKS = (
-    inspection_task("inspect-velocity", _ask_velocity),
-    inspection_task("inspect-fight", _ask_fight),
-    inspection_task("inspect-unheard", _ask_unheard),
-    inspection_task("inspect-missing", _ask_missing),
-    inspection_task("inspect-remap", _ask_remap),
-    inspection_task("inspect-parameter", _ask_parameter),
-    inspection_task("inspect-service", _ask_service),
-    inspection_task("inspect-type", _ask_type),
-    inspection_task("inspect-map", _ask_map),
-    inspection_task("inspect-rate", _ask_rate),
-    inspection_task("inspect-silent", _ask_silent),
-    inspection_task("inspect-transform", _ask_transform),
-    inspection_task("inspect-battery", _ask_battery),
-    inspection_task("inspect-clock", _ask_clock),
+INSPECTION_TASKS = tuple(
+    inspection_task(f"inspect-{name}", ask)
+    for name, ask in (
+        ("velocity", _ask_velocity),
+        ("fight", _ask_fight),
+        ("unheard", _ask_unheard),
+        ("missing", _ask_missing),
+        ("remap", _ask_remap),
+        ("parameter", _ask_parameter),
+        ("service", _ask_service),
+        ("type", _ask_type),
+        ("map", _ask_map),
+        ("rate", _ask_rate),
+        ("silent", _ask_silent),
+        ("transform", _ask_transform),
+        ("battery", _ask_battery),
+        ("clock", _ask_clock),
+    )
 )

@@ -6,8 +6,7 @@ from importlib import resources
 import numpy as np
 from ruamel.yaml import YAML
 
-from mapspeak.evaluation.scores.answers import Evidence
-from mapspeak.evaluation.scores.judging import judge_thing
+from mapspeak.evaluation.scores.judging import Evidence, judge_thing
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth
 from mapspeak.evaluation.trials import Limits, Score, Setting

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.scores.answers import (
+from mapspeak.evaluation.scores.judging import (
     Evidence,
+    count_known,
     judge_choice,
     judge_number,
     read_point,
     verdict,
 )
-from mapspeak.evaluation.scores.judging import count_known
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth, pair, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
@@ -26,8 +26,6 @@ LIMITS = Limits(n_calls=30, robot_time_s=60.0, wall_s=600.0)
 LETTERS = "ABCDEFGH"
 MOST_NEAR, MOST_FAR = 3, 2
 """Rooms to choose from: neighbours, and others."""
-AREA_RATIO, AREA_M2 = 0.15, 0.5
-WAY_RATIO, WAY_M = 0.1, 0.5
 ENOUGH_NEW_RATIO = 0.5
 """A place to explore next is good when it shows half of what the best one would."""
 N_VIEWS = 60
@@ -63,11 +61,6 @@ def _ask_area(draw: Draw, _start: Pose) -> Question:
     return text, {"number": round(room.free_area_m2, 2), "unit": "m2", "point": pair(middle)}
 
 
-def _judge_area(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    tolerance = AREA_RATIO * truth["number"] + AREA_M2
-    return judge_number(evidence, truth["number"], unit="m2", tolerance=tolerance)
-
-
 def _ask_doors(draw: Draw, _start: Pose) -> Question:
     room = draw.one_of(_closed_rooms(draw.site))
     middle = draw.site.middle_of(room)
@@ -77,10 +70,6 @@ def _ask_doors(draw: Draw, _start: Pose) -> Question:
         f"{point_text(middle)}? End with a line of the form ANSWER: 2."
     )
     return text, {"number": n_doors, "unit": "", "point": pair(middle)}
-
-
-def _judge_doors(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    return judge_number(evidence, truth["number"], unit="", tolerance=0.0)
 
 
 def _closed_rooms(site: GroundTruth) -> list[MeasuredRoom]:
@@ -111,10 +100,6 @@ def _ask_neighbours(draw: Draw, _start: Pose) -> Question:
     }
 
 
-def _judge_letters(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    return judge_choice(evidence, truth["letters"])
-
-
 def _ask_way(draw: Draw, start: Pose) -> Question:
     goal = draw.site.draw_pose(draw.random).point
     way_m = draw.site.ways_from(start.point).distance_to(goal)
@@ -125,9 +110,15 @@ def _ask_way(draw: Draw, start: Pose) -> Question:
     return text, {"number": round(way_m or 0.0, 2), "unit": "m", "point": pair(goal)}
 
 
-def _judge_way(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    tolerance = WAY_RATIO * truth["number"] + WAY_M
-    return judge_number(evidence, truth["number"], unit="m", tolerance=tolerance)
+def _judge_number(*, ratio: float, least: float) -> Callable[[GroundTruth, Truth, Evidence], Score]:
+    """Judge a number that may be off by a share of the truth and a little more."""
+
+    def judge(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+        number = truth["number"]
+        tolerance = ratio * number + least
+        return judge_number(evidence, number, unit=truth["unit"], tolerance=tolerance)
+
+    return judge
 
 
 # --- where to explore next -----------------------------------------------------------------------
@@ -161,9 +152,7 @@ def _judge_explore(site: GroundTruth, _truth: Truth, evidence: Evidence) -> Scor
 def _views(site: GroundTruth, grid: OccupancyGrid) -> list[Point]:
     """Return places on the known free floor, spread evenly and always the same."""
     places = site.grid.points_at(*np.nonzero(site.roomy))
-    rows, cols = grid.cells_at(places)
-    is_inside = grid.contains_cells(rows, cols)
-    known = places[is_inside][grid.free[rows[is_inside], cols[is_inside]]]
+    known = places[grid.look_up(grid.free, places, outside=False)]
     every = max(len(known) // N_VIEWS, 1)
     return [Point(float(x), float(y)) for x, y in known[::every]]
 
@@ -179,22 +168,26 @@ QUESTION_TASKS = (
     Task(
         name="question-area",
         draw=_question(_ask_area),
-        judge=_judge_area,
+        judge=_judge_number(ratio=0.15, least=0.5),
         is_offered=lambda site: bool(site.rooms),
     ),
     Task(
         name="question-doors",
         draw=_question(_ask_doors),
-        judge=_judge_doors,
+        judge=_judge_number(ratio=0.0, least=0.0),
         is_offered=lambda site: bool(_closed_rooms(site)),
     ),
     Task(
         name="question-neighbours",
         draw=_question(_ask_neighbours),
-        judge=_judge_letters,
+        judge=lambda _site, truth, evidence: judge_choice(evidence, truth["letters"]),
         is_offered=lambda site: len(site.rooms) > 1,
     ),
-    Task(name="question-way", draw=_question(_ask_way), judge=_judge_way),
+    Task(
+        name="question-way",
+        draw=_question(_ask_way),
+        judge=_judge_number(ratio=0.1, least=0.5),
+    ),
     Task(
         name="question-explore",
         draw=_question(_ask_explore, is_known=False),

@@ -1,12 +1,10 @@
 """Places by relation to a pose or a thing, and routes past several things."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from mapspeak.evaluation.scores.answers import Evidence
-from mapspeak.evaluation.scores.judging import judge_near, judge_pose, judge_route
+from mapspeak.evaluation.scores.judging import Evidence, judge_near, judge_pose, judge_route
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.objects import findable_kinds
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
@@ -15,13 +13,8 @@ from mapspeak.geometry import Point
 from mapspeak.places.standing import point_ahead
 from mapspeak.simulator import WorldObject
 
-SIDES = {
-    "left": ("to the left of", 90.0),
-    "right": ("to the right of", -90.0),
-    "front": ("in front of", 0.0),
-    "back": ("behind", 180.0),
-}
-"""Sides of a pose: the words, and the heading from its own, in degrees."""
+SIDES = {"to the left of": 90.0, "to the right of": -90.0, "in front of": 0.0, "behind": 180.0}
+"""Sides of a pose, and their headings from its own, in degrees."""
 COMPASS = {"east": 0.0, "north": 90.0, "west": 180.0, "south": -90.0}
 DISTANCES_M = (1.0, 1.5, 2.0)
 POSE_TOLERANCE_M = 0.4
@@ -46,20 +39,13 @@ def _place_setting(draw: Draw, prompt: str, goal: Point) -> Setting:
     return draw.setting(prompt, start, truth)
 
 
-def _judge_within(within_m: float) -> Callable[[GroundTruth, Truth, Evidence], Score]:
-    def judge(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-        return judge_near(evidence, Point(*truth["goal"]), within_m=within_m)
-
-    return judge
-
-
 def _draw_beside_pose(draw: Draw) -> Setting:
     """Draw a pose that is given by numbers, a side of it and a distance."""
     site, random = draw.site, draw.random
     for _ in range(MOST_TRIES):
         pose = site.draw_pose(random)
         yaw_deg = float(random.integers(-17, 19) * 10)
-        words, side_deg = SIDES[str(random.choice(list(SIDES)))]
+        words, side_deg = list(SIDES.items())[random.choice(len(SIDES))]
         away_m = float(random.choice(DISTANCES_M))
         goal = point_ahead(pose.point, math.radians(yaw_deg + side_deg), away_m)
         if _is_roomy(site, goal) and _is_open(site, pose.point, goal):
@@ -130,13 +116,17 @@ RELATION_TASKS = (
     Task(
         name="side-of-pose",
         draw=_draw_beside_pose,
-        judge=_judge_within(POSE_TOLERANCE_M),
+        judge=lambda _site, truth, evidence: judge_near(
+            evidence, Point(*truth["goal"]), within_m=POSE_TOLERANCE_M
+        ),
         is_offered=lambda site: bool(site.roomy.any()),
     ),
     Task(
         name="side-of-thing",
         draw=_draw_beside_thing,
-        judge=_judge_within(THING_TOLERANCE_M),
+        judge=lambda _site, truth, evidence: judge_near(
+            evidence, Point(*truth["goal"]), within_m=THING_TOLERANCE_M
+        ),
         is_offered=lambda site: bool(_places_beside(site)),
     ),
     Task(
@@ -168,13 +158,11 @@ def _draw_route(draw: Draw) -> Setting:
     )
 
 
-def _judge_stops(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    return judge_route(site, evidence, [site.things(kind) for kind in truth["kinds"]])
-
-
 ROUTE_TASK = Task(
     name="route",
     draw=_draw_route,
-    judge=_judge_stops,
+    judge=lambda site, truth, evidence: judge_route(
+        site, evidence, [site.things(kind) for kind in truth["kinds"]]
+    ),
     is_offered=lambda site: len(findable_kinds(site)) >= LEAST_STOPS,
 )

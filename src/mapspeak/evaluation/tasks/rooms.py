@@ -5,8 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mapspeak.evaluation.scores.answers import Evidence
-from mapspeak.evaluation.scores.judging import judge_room
+from mapspeak.evaluation.scores.judging import Evidence, judge_room
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth
 from mapspeak.evaluation.trials import Score, Setting

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import Evidence
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
@@ -76,10 +76,6 @@ class Draw:
         )
 
 
-def _always(_site: GroundTruth) -> bool:
-    return True
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
     """A kind of question; the same world, seed and memory give the same setting.
@@ -93,7 +89,7 @@ class Task:
     name: str
     draw: Callable[[Draw], Setting]
     judge: Callable[[GroundTruth, Truth, Evidence], Score]
-    is_offered: Callable[[GroundTruth], bool] = _always
+    is_offered: Callable[[GroundTruth], bool] = lambda _site: True
     needs_map: bool = True
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:

@@ -152,21 +152,12 @@ class CommandAgent:
     thinking: Thinking | None = None
     connection: ServerAccess = field(default=ServerAccess.COMMAND, kw_only=True)
 
-    def check(self) -> None:
-        """Check that the program is there.
-
-        Raises:
-            ConfigError: It is not.
-        """
-        self.program.check(self.thinking)
-
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carry out the assignment.
 
         Raises:
             LinkError: The program failed by itself.
         """
-        self.check()
         program, folder, log = self.program, task.folder / "client", task.folder / "calls.jsonl"
         server, answer = (*task.server, "--call-log", str(log)), folder / ANSWER
         folder.mkdir(parents=True, exist_ok=True)
