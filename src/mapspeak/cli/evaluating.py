@@ -201,11 +201,11 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
     from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
 
     from mapspeak.evaluation.runs.runner import run_evaluation  # noqa: PLC0415
-    from mapspeak.evaluation.runs.showing import announce, build_table, show_run  # noqa: PLC0415
+    from mapspeak.evaluation.runs.showing import RunBar, announce, build_table  # noqa: PLC0415
     from mapspeak.evaluation.scores.rows import count_rows  # noqa: PLC0415
 
     done: list[TrialResult] = []
-    with show_run(is_quiet=is_quiet) as bar:
+    with RunBar(is_quiet=is_quiet) as bar:
 
         def on_plan(plan: "RunPlan") -> None:
             if not is_quiet:

@@ -109,12 +109,12 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
 
     from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415
     from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
-    from mapspeak.evaluation.runs.showing import say_result, show_trials  # noqa: PLC0415
+    from mapspeak.evaluation.runs.showing import TrialBar, say_result  # noqa: PLC0415
 
     folder = folder or Path("out") / f"demo-{Path(world).stem}-{seed}"
     console = Console(soft_wrap=True, highlight=False)
     try:
-        with show_trials(is_quiet=is_quiet) as bar, usual_modes():
+        with TrialBar(is_quiet=is_quiet) as bar, usual_modes():
             results = _run_trials(world, seed, folder, bar)
             page = write_page(folder, results)
             write_log(folder, results, {}, is_whole=True)

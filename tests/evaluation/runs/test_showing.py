@@ -5,7 +5,7 @@ import io
 from rich.console import Console
 
 from mapspeak.evaluation.runs.plan import RunPlan
-from mapspeak.evaluation.runs.showing import say_result, show_run, show_trials
+from mapspeak.evaluation.runs.showing import RunBar, TrialBar, say_result
 from mapspeak.evaluation.trials import Failure, ToolCall, TrialState, Turn
 from reportmaking import make_result, make_trial
 
@@ -27,7 +27,7 @@ def draw(*parts: object, is_coloured: bool = False) -> str:
 
 
 def test_the_bar_of_a_trial_is_one_line_whatever_is_called() -> None:
-    with show_trials(is_quiet=True) as bar:
+    with TrialBar(is_quiet=True) as bar:
         lines = []
         for task in ("explore", "smallest-room"):
             bar.begin(task)
@@ -44,7 +44,7 @@ def test_the_bar_of_a_trial_is_one_line_whatever_is_called() -> None:
 
 def test_the_bar_of_a_run_is_one_line_and_keeps_its_numbers() -> None:
     trials = tuple(make_trial(number, world=LONG) for number in range(1, 13))
-    with show_run(is_quiet=True) as bar:
+    with RunBar(is_quiet=True) as bar:
         bar.begin(RunPlan(trials=trials, versions={}))
         for trial in trials:
             bar.note(make_result(trial))

@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agent import Agent, Script, ScriptAgent
@@ -16,15 +15,12 @@ from mapspeak.evaluation.agents.baselines import (
 )
 from mapspeak.evaluation.agents.command.agent import CommandAgent
 from mapspeak.evaluation.agents.command.program import find_program
-from mapspeak.evaluation.agents.models.chat import ModelAgent, Thinking
+from mapspeak.evaluation.agents.models.chat import Begin, ModelAgent, Thinking
 from mapspeak.evaluation.agents.models.mock import MockModel
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.installation import say_install
-
-if TYPE_CHECKING:
-    from mapspeak.evaluation.agents.models.throughinspect import InspectModel
 
 ORACLE, MOCK = "oracle", "mock"
 COMMAND = "command:"
@@ -81,7 +77,7 @@ def find_agent(
         program.check(amount)
         return CommandAgent(program, name, amount)
     if _is_model(name):
-        return ModelAgent(_find_model(name, amount).begin, name)
+        return ModelAgent(_begin_with(name, amount), name)
     raise ConfigError(
         f"There is no agent {name[:80]!r}.",
         hint=f"There are: {', '.join(agent_names())}; "
@@ -98,10 +94,11 @@ def _is_model(name: str) -> bool:
     return "/" in name and not name.startswith(COMMAND)
 
 
-def _find_model(name: str, thinking: Thinking | None) -> "InspectModel":
+def _begin_with(name: str, thinking: Thinking | None) -> Begin:
     try:
         from mapspeak.evaluation.agents.models.throughinspect import (  # noqa: PLC0415 - an extra
-            InspectModel,
+            InspectConversation,
+            open_model,
         )
     except ImportError as error:
         client = _find_client(name)
@@ -110,9 +107,8 @@ def _find_model(name: str, thinking: Thinking | None) -> "InspectModel":
             f"{name} is asked through inspect-ai, which is not installed.",
             hint=f"{install}, or take the agent mock.",
         ) from error
-    model = InspectModel(name, thinking)
-    model.open()
-    return model
+    open_model(name)
+    return partial(InspectConversation, name, thinking)
 
 
 def _find_client(name: str) -> str:

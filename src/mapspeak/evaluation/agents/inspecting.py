@@ -1,7 +1,7 @@
 """The scripted policy's diagnoses of a ROS, each from what the ros tools answer."""
 
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,30 +11,6 @@ from mapspeak.evaluation.trials import TrialState
 OURSELVES = "/rosbridge_websocket"
 FIELD = re.compile(r"^(\w+): (\S+)", re.MULTILINE)
 PARAMETER = re.compile(r"^(\w+): (-?[\d.]+)(?: |$)", re.MULTILINE)
-
-
-@dataclass(frozen=True, slots=True)
-class TopicReading:
-    """What ros_topic tells of a topic."""
-
-    name: str
-    text: str
-
-    @property
-    def publishers(self) -> list[str]:
-        """The nodes that publish it, but for the one through which we look."""
-        return self._nodes("published by")
-
-    @property
-    def subscribers(self) -> list[str]:
-        """The nodes that hear it, but for the one through which we look."""
-        return self._nodes("heard by")
-
-    def _nodes(self, what: str) -> list[str]:
-        said = _first(rf"(?m)^{what}: (.*)$", self.text).split(", ")
-        # What a node does for us is marked behind its name.
-        named = [each.partition(" ")[0] for each in said]
-        return [each for each in named if each.startswith("/") and each != OURSELVES]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +29,17 @@ class RosReader:
         ending = f"/{type_ending}" if type_ending else ""
         return [line[0] for line in lines if line[1].endswith(ending)]
 
-    async def find_topics(self, type_ending: str = "") -> AsyncIterator[TopicReading]:
-        """Yield the topics whose type ends so, each asked for when it is wanted."""
-        for name in await self.list_topics(type_ending):
-            yield await self.fetch_topic(name)
-
-    async def fetch_topic(self, topic: str) -> TopicReading:
-        """Return who publishes a topic, and who subscribes to it."""
-        return TopicReading(topic, await self.ask("ros_topic", topic=topic))
+    async def fetch_nodes(self, topic: str) -> tuple[list[str], list[str]]:
+        """Return who publishes a topic and who subscribes to it, but for what we look through."""
+        text = await self.ask("ros_topic", topic=topic)
+        said = (_first(rf"(?m)^{what}: (.*)$", text) for what in ("published by", "heard by"))
+        # What a node does for us is marked behind its name.
+        named = [[each.partition(" ")[0] for each in nodes.split(", ")] for nodes in said]
+        publishers, subscribers = (
+            [each for each in nodes if each.startswith("/") and each != OURSELVES]
+            for nodes in named
+        )
+        return publishers, subscribers
 
     async def fetch_time_s(self) -> float:
         """Return the robot's time; 0 where it does not say."""
@@ -106,21 +85,24 @@ async def diagnose(tools: ToolClient, question: str) -> AgentEnd:
 
 
 async def _say_velocity(reader: RosReader, question: str) -> str | None:
-    topic = await reader.fetch_topic(_first(rf"velocities on ({NAME})", question))
-    return ", ".join((*topic.publishers[:1], *topic.subscribers[:1]))
+    topic = _first(rf"velocities on ({NAME})", question)
+    publishers, subscribers = await reader.fetch_nodes(topic)
+    return ", ".join((*publishers[:1], *subscribers[:1]))
 
 
 async def _say_fight(reader: RosReader, _question: str) -> str | None:
-    async for topic in reader.find_topics("Twist"):
-        if len(topic.publishers) > 1:
-            return ", ".join(topic.publishers)
+    for topic in await reader.list_topics("Twist"):
+        publishers, _ = await reader.fetch_nodes(topic)
+        if len(publishers) > 1:
+            return ", ".join(publishers)
     return None
 
 
 async def _say_unheard(reader: RosReader, _question: str) -> str | None:
-    async for topic in reader.find_topics():
-        if topic.publishers and not topic.subscribers:
-            return topic.name
+    for topic in await reader.list_topics():
+        publishers, subscribers = await reader.fetch_nodes(topic)
+        if publishers and not subscribers:
+            return topic
     return None
 
 
@@ -128,19 +110,23 @@ async def _say_missing(reader: RosReader, question: str) -> str | None:
     launched = re.findall(NAME, _first(r"starts the nodes (.+?)\. One", question))
     running = (await reader.ask("ros_nodes")).splitlines()[1:]
     missing = [node for node in launched if node not in running]
-    async for topic in reader.find_topics():
-        if missing and topic.subscribers and not topic.publishers:
-            return f"{missing[0]}, {topic.name}"
+    for topic in await reader.list_topics() if missing else ():
+        publishers, subscribers = await reader.fetch_nodes(topic)
+        if subscribers and not publishers:
+            return f"{missing[0]}, {topic}"
     return None
 
 
 async def _say_remap(reader: RosReader, question: str) -> str | None:
     node = _first(rf"yet ({NAME}) gets no scans", question)
     wanted = _first(r"(?m)^hears: (.*)$", await reader.ask("ros_node", node=node)).split(", ")
-    scans = [topic async for topic in reader.find_topics("LaserScan")]
-    waits = next((each for each in scans if each.name in wanted and not each.publishers), None)
-    comes = next((each for each in scans if each.publishers), None)
-    return None if waits is None or comes is None else f"{waits.name}, {comes.name}"
+    scans = {
+        topic: (await reader.fetch_nodes(topic))[0]
+        for topic in await reader.list_topics("LaserScan")
+    }
+    waits = next((topic for topic, by in scans.items() if topic in wanted and not by), None)
+    comes = next((topic for topic, by in scans.items() if by), None)
+    return None if waits is None or comes is None else f"{waits}, {comes}"
 
 
 async def _say_parameter(reader: RosReader, question: str) -> str | None:
@@ -166,9 +152,9 @@ async def _say_service(reader: RosReader, question: str) -> str | None:
 
 
 async def _say_type(reader: RosReader, question: str) -> str | None:
-    topic = await reader.fetch_topic(_first(rf"messages on ({NAME})", question))
+    text = await reader.ask("ros_topic", topic=_first(rf"messages on ({NAME})", question))
     kind = _first(r"of the type (\w+)\?", question)
-    fields = FIELD.findall(topic.text.partition("heard by: ")[2].partition("\n")[2])
+    fields = FIELD.findall(text.partition("heard by: ")[2].partition("\n")[2])
     return ", ".join(name for name, each in fields if each == kind) or None
 
 

@@ -3,9 +3,8 @@
 A bar is drawn only where standard error is a terminal; elsewhere each result is a line.
 """
 
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import Self
 
 from rich.console import Console
 from rich.markup import escape
@@ -14,7 +13,6 @@ from rich.progress import (
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
-    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -70,8 +68,30 @@ def say_result(result: TrialResult) -> str:
     return f"{word}  {escape(asked)}: {escape(result.score.reason)}"
 
 
-@dataclass(slots=True)
-class RunBar:
+class _Bar:
+    """A bar on standard error, where that is a terminal; it is there until the context ends."""
+
+    def __init__(self, *columns: ProgressColumn, is_quiet: bool) -> None:
+        console = Console(stderr=True)
+        text = TextColumn("{task.description}", table_column=SPARE_TEXT)
+        is_off = is_quiet or not console.is_terminal
+        self.progress = Progress(
+            *columns, text, console=console, disable=is_off, expand=True, transient=True
+        )
+        self._bar = self.progress.add_task("starting", total=None)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.progress.stop()
+
+    def tell(self, said: str) -> None:
+        """Say something above the bar."""
+        self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
+
+
+class RunBar(_Bar):
     """Counts results while they come in.
 
     Attributes:
@@ -79,19 +99,17 @@ class RunBar:
         n_broken: Trials that crashed or hung, preparations among them.
     """
 
-    progress: Progress
-    bar: TaskID
-    n_asked: int = 0
-    n_done: int = 0
-    n_broken: int = 0
-    _n_successes: int = 0
-    _preparations: tuple[Trial, ...] = ()
+    def __init__(self, *, is_quiet: bool) -> None:
+        numbers = (MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+        super().__init__(BarColumn(bar_width=BAR_WIDTH), *numbers, is_quiet=is_quiet)
+        self.n_asked = self.n_done = self.n_broken = self._n_successes = 0
+        self._preparations: tuple[Trial, ...] = ()
 
     def begin(self, plan: RunPlan) -> None:
         """Take note of how much there is to do, and begin to show it."""
         self._preparations = plan.preparations
         self.n_asked = len(plan.trials) + len(plan.preparations)
-        self.progress.update(self.bar, total=self.n_asked, description="starting")
+        self.progress.update(self._bar, total=self.n_asked, description="starting")
         self.progress.start()
 
     def note(self, result: TrialResult) -> None:
@@ -101,37 +119,29 @@ class RunBar:
         if result.trial not in self._preparations:
             self._n_successes += result.score.is_success
         said = f"{self._n_successes} done, {self.n_broken} broken; last {result.trial.id}"
-        self.progress.update(self.bar, advance=1, description=said)
+        self.progress.update(self._bar, advance=1, description=said)
         if not self.progress.console.is_terminal:
-            _tell(
-                self.progress,
-                f"{self.n_done}/{self.n_asked} {result.trial.id}: {result.score.reason}",
-            )
+            self.tell(f"{self.n_done}/{self.n_asked} {result.trial.id}: {result.score.reason}")
 
 
-@contextmanager
-def show_run(*, is_quiet: bool) -> Generator[RunBar]:
-    """Offer something to tell results to; it draws on standard error, or nothing at all."""
-    numbers = (MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    progress = _make_progress(is_quiet, BarColumn(bar_width=BAR_WIDTH), *numbers)
-    try:
-        yield RunBar(progress, progress.add_task("starting", total=None))
-    finally:
-        progress.stop()
-
-
-@dataclass(slots=True)
-class TrialBar:
+class TrialBar(_Bar):
     """Shows a trial while it goes on."""
 
-    progress: Progress
-    bar: TaskID
-    _n_calls: int = 0
+    def __init__(self, *, is_quiet: bool) -> None:
+        super().__init__(
+            TextColumn("{task.fields[stage]:<13}"),
+            BarColumn(bar_width=BAR_WIDTH),
+            TextColumn("{task.fields[n_calls]:>4} calls"),
+            TimeElapsedColumn(),
+            is_quiet=is_quiet,
+        )
+        self._n_calls = 0
+        self.progress.update(self._bar, stage="", n_calls=0)
 
     def begin(self, task: str) -> None:
         """Show that a trial begins."""
         self._n_calls = 0
-        self.progress.update(self.bar, stage=task, n_calls=0, description="starting")
+        self.progress.update(self._bar, stage=task, n_calls=0, description="starting")
         self.progress.start()
 
     def note(self, turn: Turn) -> None:
@@ -139,38 +149,7 @@ class TrialBar:
         if turn.call is not None and turn.role != "tool":
             self._n_calls += 1
             said = " ".join((turn.call.tool, *map(str, turn.call.arguments.values())))
-            self.progress.update(self.bar, n_calls=self._n_calls, description=escape(said))
-
-    def tell(self, said: str) -> None:
-        """Say something above the bar."""
-        _tell(self.progress, said)
-
-
-def _tell(progress: Progress, said: str) -> None:
-    progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
-
-
-@contextmanager
-def show_trials(*, is_quiet: bool) -> Generator[TrialBar]:
-    """Offer something to tell the turns of trials to; it draws on standard error, or nothing."""
-    progress = _make_progress(
-        is_quiet,
-        TextColumn("{task.fields[stage]:<13}"),
-        BarColumn(bar_width=BAR_WIDTH),
-        TextColumn("{task.fields[n_calls]:>4} calls"),
-        TimeElapsedColumn(),
-    )
-    try:
-        yield TrialBar(progress, progress.add_task("starting", total=None, stage="", n_calls=0))
-    finally:
-        progress.stop()
-
-
-def _make_progress(is_quiet: bool, *columns: ProgressColumn) -> Progress:  # noqa: FBT001 - a flag
-    console = Console(stderr=True)
-    text = TextColumn("{task.description}", table_column=SPARE_TEXT)
-    is_off = is_quiet or not console.is_terminal
-    return Progress(*columns, text, console=console, disable=is_off, expand=True, transient=True)
+            self.progress.update(self._bar, n_calls=self._n_calls, description=escape(said))
 
 
 def build_table(rows: Sequence[TableRow]) -> Table:

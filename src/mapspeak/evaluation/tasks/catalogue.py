@@ -12,11 +12,10 @@ from mapspeak.errors import ConfigError
 from mapspeak.evaluation.scores.judging import judge_coverage
 from mapspeak.evaluation.tasks.failures import FAILURE_TASKS
 from mapspeak.evaluation.tasks.inspections import INSPECTION_TASKS
-from mapspeak.evaluation.tasks.objects import OBJECT_TASKS
 from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
-from mapspeak.evaluation.tasks.relations import RELATION_TASKS, ROUTE_TASK
 from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
 from mapspeak.evaluation.tasks.task import Draw, Task
+from mapspeak.evaluation.tasks.things import OBJECT_TASKS, RELATION_TASKS, ROUTE_TASK
 from mapspeak.evaluation.trials import Limits, Setting
 from mapspeak.server.prompts import read_text
 

@@ -13,7 +13,8 @@ from ruamel.yaml import YAML
 
 from mapspeak.evaluation.scores.judging import Evidence, judge_room, read_word, verdict
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.tasks.objects import (
+from mapspeak.evaluation.tasks.task import Draw, Task, Truth, pair, point_text
+from mapspeak.evaluation.tasks.things import (
     SEARCH_LIMITS,
     SEARCH_TOOLS,
     draw_wish,
@@ -21,7 +22,6 @@ from mapspeak.evaluation.tasks.objects import (
     judge_kind,
     thing_setting,
 )
-from mapspeak.evaluation.tasks.task import Draw, Task, Truth, pair, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import MeasuredRoom, WorldDoor, WorldObject

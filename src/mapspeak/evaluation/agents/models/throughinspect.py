@@ -7,7 +7,6 @@ who asks a model imports this module: the library is the optional extra `eval`.
 import base64
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 # It has no public name, and is what a missing package or key is told with.
 from inspect_ai._util.error import PrerequisiteError
@@ -29,7 +28,6 @@ from mcp_types import Tool
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agent import Assignment, ToolAnswer
 from mapspeak.evaluation.agents.models.chat import (
-    ModelConversation,
     Reply,
     Thinking,
     ToolCallRequest,
@@ -44,53 +42,19 @@ MOST_SAID = 300
 """Characters of a provider's error that are passed on: some repeat the whole request."""
 
 
-@dataclass(frozen=True, slots=True)
-class InspectModel:
-    """A model behind the library.
+def open_model(name: str) -> Model:
+    """Return the library's model, without asking it.
 
-    Attributes:
-        thinking: How much it may think; None leaves it to the provider.
+    Raises:
+        ConfigError: A package, a key or an address is missing.
     """
-
-    name: str
-    thinking: Thinking | None
-
-    def begin(self, task: Assignment, tools: Sequence[Tool]) -> ModelConversation:
-        """Begin a conversation.
-
-        Raises:
-            ConfigError: The model cannot be asked: a package, a key or an address is missing.
-        """
-        config = GenerateConfig(
-            max_retries=MOST_RETRIES,
-            attempt_timeout=ANSWER_WITHIN_S,
-            seed=task.seed,
-            # The library makes a budget of it where a provider counts thoughts in tokens.
-            reasoning_effort=None if self.thinking is None else self.thinking.value,
-        )
-        return _InspectConversation(
-            model=self.open(),
-            messages=[
-                ChatMessageSystem(content=task.system),
-                ChatMessageUser(content=task.prompt),
-            ],
-            tools=[_as_info(tool) for tool in tools],
-            config=config,
-        )
-
-    def open(self) -> Model:
-        """Return the library's model, without asking it.
-
-        Raises:
-            ConfigError: A package, a key or an address is missing.
-        """
-        try:
-            return get_model(self.name, memoize=False)
-        except (PrerequisiteError, ValueError) as error:
-            raise ConfigError(
-                f"The model {self.name} cannot be asked: {_plain(error)}",
-                hint="Install the provider's package and set its key, as the message says.",
-            ) from error
+    try:
+        return get_model(name, memoize=False)
+    except (PrerequisiteError, ValueError) as error:
+        raise ConfigError(
+            f"The model {name} cannot be asked: {_plain(error)}",
+            hint="Install the provider's package and set its key, as the message says.",
+        ) from error
 
 
 def _plain(error: Exception) -> str:
@@ -99,24 +63,47 @@ def _plain(error: Exception) -> str:
     return f"{said.removeprefix('ERROR: ').rstrip('.')}."
 
 
-@dataclass(slots=True)
-class _InspectConversation:
-    model: Model
-    messages: list[ChatMessage]
-    tools: list[ToolInfo]
-    config: GenerateConfig
+class InspectConversation:
+    """A conversation with a model behind the library.
+
+    Args:
+        thinking: How much the model may think; None leaves it to the provider.
+
+    Raises:
+        ConfigError: The model cannot be asked: a package, a key or an address is missing.
+    """
+
+    def __init__(
+        self, name: str, thinking: Thinking | None, task: Assignment, tools: Sequence[Tool]
+    ) -> None:
+        self._model = open_model(name)
+        self._messages: list[ChatMessage] = [
+            ChatMessageSystem(content=task.system),
+            ChatMessageUser(content=task.prompt),
+        ]
+        self._tools = [_as_info(tool) for tool in tools]
+        self._config = GenerateConfig(
+            max_retries=MOST_RETRIES,
+            attempt_timeout=ANSWER_WITHIN_S,
+            seed=task.seed,
+            # The library makes a budget of it where a provider counts thoughts in tokens.
+            reasoning_effort=None if thinking is None else thinking.value,
+        )
 
     async def ask(self) -> Reply:
+        """Return the model's answer to all that was said so far."""
         try:
-            output = await self.model.generate(self.messages, tools=self.tools, config=self.config)
+            output = await self._model.generate(
+                self._messages, tools=self._tools, config=self._config
+            )
         except Exception as error:  # each provider has errors of its own, of no common kind
             raise LinkError(
-                f"{self.model} cannot be asked: {_say_cause(error)}",
+                f"{self._model} cannot be asked: {_say_cause(error)}",
                 hint="See the provider's own words; "
                 f"`{shell_command('eval --retry')}` runs what broke again.",
             ) from error
         # Said again as it is: some providers want their own thoughts back, signed.
-        self.messages.append(output.message)
+        self._messages.append(output.message)
         n_read = n_written = None
         if (usage := output.usage) is not None:
             # The library counts cached tokens apart.
@@ -140,12 +127,13 @@ class _InspectConversation:
         )
 
     def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
+        """Say what a call was answered, with its pictures, or the error as an error."""
         content: list[Content] = [ContentText(text=answer.text)]
         for picture in answer.pictures:
             data = base64.b64encode(picture.data).decode()
             content.append(ContentImage(image=f"data:{picture.media_type};base64,{data}"))
         error = ToolCallError("unknown", answer.text) if answer.is_error else None
-        self.messages.append(
+        self._messages.append(
             ChatMessageTool(content=content, tool_call_id=call.id, function=call.tool, error=error)
         )
 
