@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from mcp.client import Client
 from mcp_types import CallToolResult, ImageContent, TextContent, Tool
@@ -186,39 +186,19 @@ def gave_up(why: str) -> AgentEnd:
     return AgentEnd(answer=why, state=TrialState.GAVE_UP)
 
 
-class Agent(Protocol):
-    """Carries out an assignment by calling tools."""
-
-    @property
-    def name(self) -> str:
-        """Return its name, as in `Trial.agent`."""
-        ...
-
-    @property
-    def connection(self) -> ServerAccess:
-        """Say how it reaches the server."""
-        ...
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment.
-
-        Raises:
-            OutOfBudgetError: A call would have gone beyond the limits; let it pass through.
-        """
-        ...
-
-
-Script = Callable[[Assignment, ToolClient], Awaitable[AgentEnd]]
+Work = Callable[[Assignment, ToolClient], Awaitable[AgentEnd]]
 
 
 @dataclass(frozen=True, slots=True)
-class ScriptAgent:
-    """A script, which reads what tools answer as text, and needs no pipe."""
+class Agent:
+    """A script, a model or a client program.
+
+    Attributes:
+        name: As in `Trial.agent`.
+        work: Carries out an assignment by calling tools; it lets an OutOfBudgetError pass through.
+        connection: How it reaches the server: scripts read what tools answer, and need no pipe.
+    """
 
     name: str
-    script: Script
+    work: Work
     connection: ServerAccess = ServerAccess.MEMORY
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment."""
-        return await self.script(task, tools)

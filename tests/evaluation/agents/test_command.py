@@ -10,7 +10,7 @@ import clientprogram
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agent import Assignment, ToolClient
-from mapspeak.evaluation.agents.command.agent import CommandAgent
+from mapspeak.evaluation.agents.command.agent import run_program
 from mapspeak.evaluation.agents.command.program import AnswerForm, Program, find_program
 from mapspeak.evaluation.agents.finding import find_versions
 from mapspeak.evaluation.agents.models.chat import Thinking
@@ -63,8 +63,8 @@ def written_in(folder: Path) -> str:
 
 async def test_a_programs_calls_are_heard_with_their_answers_and_pictures(tmp_path: Path) -> None:
     witness = Hearing()
-    end = await CommandAgent(CLIENT, "command:test").run(
-        assignment(tmp_path, "look around"), ToolClient(None, witness)
+    end = await run_program(
+        CLIENT, None, assignment(tmp_path, "look around"), ToolClient(None, witness)
     )
     assert end.state is TrialState.FINISHED
     assert end.answer == "ANSWER: kept, the key is [TEST_KEY]"
@@ -80,22 +80,20 @@ async def test_a_program_that_fails_breaks_the_trial_without_telling_its_secrets
     tmp_path: Path,
 ) -> None:
     with pytest.raises(LinkError, match=r"status 3: cannot log in with \[TEST_KEY\]"):
-        await CommandAgent(CLIENT, "command:test").run(
-            assignment(tmp_path, "crash"), ToolClient(None, Hearing())
-        )
+        await run_program(CLIENT, None, assignment(tmp_path, "crash"), ToolClient(None, Hearing()))
     assert KEY not in written_in(tmp_path)
 
 
 async def test_a_program_that_calls_nothing_says_nothing_of_its_model(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="called no tool"):
-        await CommandAgent(CLIENT, "command:test").run(
-            assignment(tmp_path, "do nothing"), ToolClient(None, Hearing())
+        await run_program(
+            CLIENT, None, assignment(tmp_path, "do nothing"), ToolClient(None, Hearing())
         )
 
 
 async def test_a_program_that_calls_too_much_is_ended_with_its_server(tmp_path: Path) -> None:
-    end = await CommandAgent(CLIENT, "command:test").run(
-        assignment(tmp_path, "look and wait"), ToolClient(None, Hearing(most=1))
+    end = await run_program(
+        CLIENT, None, assignment(tmp_path, "look and wait"), ToolClient(None, Hearing(most=1))
     )
     assert end.state is TrialState.OUT_OF_BUDGET
     assert "More than 1 calls" in end.answer
@@ -103,8 +101,8 @@ async def test_a_program_that_calls_too_much_is_ended_with_its_server(tmp_path: 
 
 
 async def test_a_program_whose_time_is_up_is_ended(tmp_path: Path) -> None:
-    end = await CommandAgent(CLIENT, "command:test").run(
-        assignment(tmp_path, "wait", wall_s=10.5), ToolClient(None, Hearing())
+    end = await run_program(
+        CLIENT, None, assignment(tmp_path, "wait", wall_s=10.5), ToolClient(None, Hearing())
     )
     assert end.state is TrialState.OUT_OF_BUDGET
     await until_gone(str(tmp_path))

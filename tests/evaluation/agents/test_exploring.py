@@ -5,7 +5,7 @@ import pytest
 from drawing import grid_from_text
 from fakes import FakeRobot
 from hearing import Hearing
-from mapspeak.evaluation.agent import AgentEnd, Assignment, Script, ToolClient
+from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient, Work
 from mapspeak.evaluation.agents.baselines import explore_nearest_frontiers, follow_paper
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.geometry import Pose
@@ -27,7 +27,7 @@ UNSEEN_M = 13.5
 """The unknown begins so far to the right."""
 
 
-async def run(agent: Script, prompt: str, folder: Path) -> tuple[AgentEnd, Hearing]:
+async def run(agent: Work, prompt: str, folder: Path) -> tuple[AgentEnd, Hearing]:
     """Lets an agent work in a building whose right end nobody has seen."""
     robot = FakeRobot(grid_from_text(HALF_SEEN, resolution_m=0.5), pose=Pose(1.8, 1.8))
     task = Assignment(prompt=prompt, system="", limits=Limits(), seed=0, server=(), folder=folder)

@@ -19,11 +19,12 @@ from mapspeak.evaluation.agent import (
 )
 from mapspeak.evaluation.agents.finding import check_agent, find_agent
 from mapspeak.evaluation.agents.models.chat import (
-    ModelAgent,
+    Begin,
     ModelConversation,
     Reply,
     ToolCallRequest,
     estimate_picture_tokens,
+    work_with_model,
 )
 from mapspeak.evaluation.agents.models.mock import MockModel
 from mapspeak.evaluation.trials import Limits, TrialState
@@ -40,7 +41,7 @@ def assignment(folder: Path, *, seed: int = 0, prompt: str = "Go there.") -> Ass
 
 
 async def run(
-    agent: ModelAgent,
+    begin: Begin,
     task: Assignment,
     witness: Witness,
     representation: Representation = Representation.PICTURE_TABLE,
@@ -49,7 +50,7 @@ async def run(
     robot = FakeRobot(two_rooms())
     async with connect(robot, task.folder, representation=representation) as client:
         tools = ToolClient(client, witness)
-        return await agent.run(task, tools), tools
+        return await work_with_model(begin, task, tools), tools
 
 
 class Scripted:
@@ -79,7 +80,7 @@ async def test_the_mock_model_comes_to_an_end_however_the_map_is_shown(
     tmp_path: Path, representation: Representation
 ) -> None:
     witness = Hearing()
-    agent = ModelAgent(MockModel, "mock")
+    agent = MockModel
     end, _ = await run(agent, assignment(tmp_path), witness, representation)
     assert (end.state, end.answer) == (TrialState.FINISHED, "ANSWER: there")
     assert witness.calls[:3] == ["look_at_map", "look_through_camera", "describe_place"]
@@ -91,7 +92,7 @@ async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None
     async def calls_with(seed: int) -> list[tuple[str, str]]:
         task = assignment(tmp_path, seed=seed)
         ledger = Hearing()
-        await run(ModelAgent(MockModel, "mock"), task, ledger)
+        await run(MockModel, task, ledger)
         return [(call.tool, str(call.arguments)) for call in ledger.made]
 
     assert await calls_with(1) == await calls_with(1)
@@ -107,7 +108,7 @@ async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
         Reply(text="Done.", n_input_tokens=3000, n_output_tokens=2),
     )
     witness = Hearing()
-    end, _ = await run(ModelAgent(model.begin, "x/y"), assignment(tmp_path), witness)
+    end, _ = await run(model.begin, assignment(tmp_path), witness)
     one = estimate_picture_tokens(witness.answers[0].pictures[0])
     assert (end.n_input_tokens, end.n_output_tokens, end.n_picture_tokens) == (4600, 12, 3 * one)
     counted = [n_tokens for _, n_tokens in witness.words]
@@ -116,9 +117,7 @@ async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
 
 
 async def test_an_api_that_does_not_count_leaves_tokens_unknown(tmp_path: Path) -> None:
-    end, _ = await run(
-        ModelAgent(Scripted(Reply(text="Done.")).begin, "x/y"), assignment(tmp_path), Hearing()
-    )
+    end, _ = await run(Scripted(Reply(text="Done.")).begin, assignment(tmp_path), Hearing())
     assert (end.n_input_tokens, end.n_output_tokens) == (None, None)
 
 
@@ -130,7 +129,7 @@ async def test_errors_reach_the_model_as_errors_and_it_may_go_on(tmp_path: Path)
     )
     model = Scripted(Reply(text="", calls=(wrong, unknown, garbled)), Reply(text="Done."))
     witness = Hearing()
-    end, _ = await run(ModelAgent(model.begin, "x/y"), assignment(tmp_path), witness)
+    end, _ = await run(model.begin, assignment(tmp_path), witness)
     assert end.state is TrialState.FINISHED
     assert [call for call, _ in model.heard] == [wrong, unknown, garbled]
     assert [answer.is_error for _, answer in model.heard] == [True, True, True]
@@ -141,9 +140,7 @@ async def test_out_of_budget_it_still_says_what_it_has_cost(tmp_path: Path) -> N
     looking = [
         Reply(text="", calls=(LOOK,), n_input_tokens=10, n_output_tokens=1) for _ in range(3)
     ]
-    end, _ = await run(
-        ModelAgent(Scripted(*looking).begin, "x/y"), assignment(tmp_path), Hearing(most=2)
-    )
+    end, _ = await run(Scripted(*looking).begin, assignment(tmp_path), Hearing(most=2))
     assert end.state is TrialState.OUT_OF_BUDGET
     assert (end.n_decisions, end.n_input_tokens) == (3, 30)
 
@@ -160,14 +157,14 @@ async def test_a_model_that_did_not_end_by_itself_has_not_finished(
     tmp_path: Path, said: str, state: TrialState, answer: str
 ) -> None:
     model = Scripted(Reply(text=said, state=state))
-    end, _ = await run(ModelAgent(model.begin, "x/y"), assignment(tmp_path), Hearing())
+    end, _ = await run(model.begin, assignment(tmp_path), Hearing())
     assert (end.state, end.answer) == (state, answer)
 
 
 async def test_a_call_that_came_before_the_cut_is_made(tmp_path: Path) -> None:
     cut = Reply(text="", calls=(LOOK,), state=TrialState.OUT_OF_BUDGET)
     witness = Hearing()
-    agent = ModelAgent(Scripted(cut, Reply(text="Done.")).begin, "x/y")
+    agent = Scripted(cut, Reply(text="Done.")).begin
     end, _ = await run(agent, assignment(tmp_path), witness)
     assert (end.state, witness.calls) == (TrialState.FINISHED, ["look_at_map"])
 

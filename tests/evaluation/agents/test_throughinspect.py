@@ -63,7 +63,7 @@ async def run(
     problem: LinkError | None = None
     async with connect(FakeRobot(two_rooms()), folder) as client:
         try:
-            return await agent.run(task, ToolClient(client, witness))
+            return await agent.work(task, ToolClient(client, witness))
         except LinkError as error:
             problem = error
     raise problem

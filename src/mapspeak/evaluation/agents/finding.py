@@ -6,16 +6,16 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agent import Agent, Script, ScriptAgent
+from mapspeak.evaluation.agent import Agent, ServerAccess, Work
 from mapspeak.evaluation.agents.baselines import (
     answer_at_random,
     answer_by_truth,
     explore_nearest_frontiers,
     follow_paper,
 )
-from mapspeak.evaluation.agents.command.agent import CommandAgent
+from mapspeak.evaluation.agents.command.agent import run_program
 from mapspeak.evaluation.agents.command.program import find_program
-from mapspeak.evaluation.agents.models.chat import Begin, ModelAgent, Thinking
+from mapspeak.evaluation.agents.models.chat import Begin, Thinking, work_with_model
 from mapspeak.evaluation.agents.models.mock import MockModel
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.site import GroundTruth
@@ -28,7 +28,7 @@ CLIENT = "openai"
 """The package that inspect-ai speaks through where there is no other; the extra brings it."""
 CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
 """Packages that it speaks through to other providers."""
-SCRIPTS: dict[str, Script] = {
+SCRIPTS: dict[str, Work] = {
     "scripted": follow_script,
     "random": answer_at_random,
     "nearest-frontier": explore_nearest_frontiers,
@@ -67,17 +67,18 @@ def find_agent(
     """
     amount = read_thinking(thinking)
     if name == ORACLE and truth is not None:
-        return ScriptAgent(name, partial(answer_by_truth, *truth))
+        return Agent(name, partial(answer_by_truth, *truth))
     if name in SCRIPTS:
-        return ScriptAgent(name, SCRIPTS[name])
+        return Agent(name, SCRIPTS[name])
     if name == MOCK:
-        return ModelAgent(MockModel, name)
+        return Agent(name, partial(work_with_model, MockModel), ServerAccess.STDIO)
     if name.startswith(COMMAND):
         program = find_program(name.removeprefix(COMMAND))
         program.check(amount)
-        return CommandAgent(program, name, amount)
+        return Agent(name, partial(run_program, program, amount), ServerAccess.COMMAND)
     if _is_model(name):
-        return ModelAgent(_begin_with(name, amount), name)
+        begin = _begin_with(name, amount)
+        return Agent(name, partial(work_with_model, begin), ServerAccess.STDIO)
     raise ConfigError(
         f"There is no agent {name[:80]!r}.",
         hint=f"There are: {', '.join(agent_names())}; "

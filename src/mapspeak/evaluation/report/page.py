@@ -82,7 +82,10 @@ def _our_row(agent: str, representation: str, rows: Iterable[TableRow]) -> list[
     return [
         _cell(agent, f"here, {representation}: {kind}"),
         _cell(NOT_RUN) if explored is None else _coverage(explored),
-        *(_cell(NOT_RUN) if row is None else _share_of(row) for row in others),
+        *(
+            _cell(NOT_RUN) if row is None else _share(row.n_successes, row.n_trials, row.n_broken)
+            for row in others
+        ),
     ]
 
 
@@ -90,7 +93,8 @@ def _coverage(row: TableRow) -> Html:
     names = {"paper_ratio": "by the paper's ratio", "recall": "recall", "known_ratio": "known"}
     figures = ((row.figures.get(f"coverage_{name}"), said) for name, said in names.items())
     said = ", ".join(f"{_percent(value)} {name}" for value, name in figures if value is not None)
-    return _cell(said or NOT_RUN, f"{row.n_successes}/{row.n_trials} done{_say_broken(row)}")
+    broken = f"; {row.n_broken} broken" if row.n_broken else ""
+    return _cell(said or NOT_RUN, f"{row.n_successes}/{row.n_trials} done{broken}")
 
 
 def _list_trials(results: Iterable[TrialResult]) -> Iterator[Html]:
@@ -117,21 +121,14 @@ def _line(result: TrialResult) -> list[Html]:
     ]
 
 
-def _share_of(row: TableRow) -> Html:
-    return _share(row.n_successes, row.n_trials, _say_broken(row))
-
-
-def _share(n_successes: int, n_trials: int, more: str = "") -> Html:
+def _share(n_successes: int, n_trials: int, n_broken: int = 0) -> Html:
     """Return how many trials were done in a cell, with Wilson's interval."""
     share = wilson_interval(n_successes, n_trials)
     if share is None:
         return _cell(NOT_RUN)
-    span = f"{_percent(share.low)} to {_percent(share.high)}{more}"
+    broken = f"; {n_broken} broken" if n_broken else ""
+    span = f"{_percent(share.low)} to {_percent(share.high)}{broken}"
     return _cell(f"{n_successes}/{n_trials} ({_percent(share.value)})", span)
-
-
-def _say_broken(row: TableRow) -> str:
-    return f"; {row.n_broken} broken" if row.n_broken else ""
 
 
 def _percent(ratio: float) -> str:

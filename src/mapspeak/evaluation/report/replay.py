@@ -181,15 +181,7 @@ def _group(turns: Sequence[Turn]) -> list[list[Turn]]:
     """Return what is shown at once: something said, or a call with its answer."""
     groups: list[list[Turn]] = []
     for turn in turns:
-        before = groups[-1][-1] if groups else None
-        if (
-            turn.role == "tool"
-            and turn.call is not None
-            and before is not None
-            and before.role != "tool"
-            and before.call is not None
-            and before.call.tool == turn.call.tool
-        ):
+        if turn.role == "tool" and groups and groups[-1][-1].role == "agent":
             groups[-1].append(turn)
         else:
             groups.append([turn])
@@ -228,9 +220,8 @@ def _say_who(turn: Turn) -> Iterator[Html]:
             yield element("code", {"class": "arguments"}, text(written))
     if turn.is_error:
         yield element("span", {"class": "word bad"}, text("error"))
-    robot = [] if turn.robot_s is None else [f"robot {turn.robot_s:.1f} s"]
-    when = (f"{turn.wall_s:.1f} s", *robot)
-    yield element("small", {}, text(", ".join(when)))
+    robot = "" if turn.robot_s is None else f", robot {turn.robot_s:.1f} s"
+    yield element("small", {}, text(f"{turn.wall_s:.1f} s{robot}"))
 
 
 def _words(said: str) -> Html:

@@ -210,7 +210,7 @@ async def _work(
             transcript.hear(Turn(role="user", text=setting.prompt))
             try:
                 with anyio.move_on_after(setting.limits.wall_s):
-                    end = await agent.run(assignment, ToolClient(place.client, transcript))
+                    end = await agent.work(assignment, ToolClient(place.client, transcript))
             except* OutOfBudgetError as group:
                 end = AgentEnd(answer=str(group.exceptions[0]), state=TrialState.OUT_OF_BUDGET)
             transcript.hear(Turn(role="agent", text=end.answer))

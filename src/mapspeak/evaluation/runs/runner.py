@@ -5,6 +5,7 @@ trial that has a result is not run again.
 """
 
 import errno
+import gc
 import multiprocessing
 import os
 import signal
@@ -45,8 +46,12 @@ from mapspeak.simulator import World
 
 ERRORS = "errors.txt"
 LOCK = ".run.lock"
-PRELOAD = ("mapspeak.evaluation.runs.runner", "mapspeak.evaluation.runs.preload", "mapspeak.cli")
-"""What every trial needs; imported once, before processes are forked."""
+PRELOAD = (
+    *("mapspeak.evaluation.runs.runner", "mapspeak.cli", "PIL.Image", "anyio._backends._asyncio"),
+    *("jsonschema", "mcp.client.stdio", "numpy.fft", "numpy.ma", "rich.logging", "ruamel.yaml"),
+)
+"""What every trial needs, also what others import only when they first need it: imported once,
+before processes are forked."""
 LAST_WORDS = 2000
 """Characters of a crash that its result keeps."""
 FULL_DISK = 74
@@ -324,6 +329,8 @@ def _write_broken(run: Path, job: TrialJob, state: TrialState, error: str) -> Tr
 
 def _work_apart(work: Callable[[], object], errors: Path) -> None:
     """Do the work; what it says goes to a file, and it ends when the run does."""
+    # What was loaded stays for good: no collection has to go through it, nor copy its pages.
+    gc.freeze()
     if (parent := multiprocessing.parent_process()) is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
     # Ctrl-C in a terminal reaches all processes; what becomes of a trial is the run's to say.

@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mapspeak.evaluation.scores.judging import Evidence, judge_room
+from mapspeak.evaluation.scores.judging import judge_room
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.tasks.task import Draw, Task, Truth
-from mapspeak.evaluation.trials import Score, Setting
+from mapspeak.evaluation.tasks.task import Draw, Task
+from mapspeak.evaluation.trials import Setting
 from mapspeak.simulator import MeasuredRoom
 from mapspeak.spatial.rooms import RoomClass
 
@@ -20,18 +20,15 @@ ORDINALS = {2: "second", 3: "third", 4: "fourth"}
 
 Choice = tuple[str, tuple[MeasuredRoom, ...]]
 """A question for a room, and the rooms of which any is right."""
-Choose = Callable[[GroundTruth, np.random.Generator | None], Choice | None]
-"""Draws a question; None where the world has no clear answer."""
+FindChoices = Callable[[GroundTruth], list[Choice]]
+"""Finds the questions that have a clear answer in a world."""
 
 
-def _room_task(name: str, choose: Choose) -> Task:
+def _room_task(name: str, find_choices: FindChoices) -> Task:
     """Return the task of driving to the room that has a size, from anywhere but in it."""
 
     def draw(draw: Draw) -> Setting:
-        choice = choose(draw.site, draw.random)
-        if choice is None:
-            raise AssertionError("the task is offered here")
-        prompt, rooms = choice
+        prompt, rooms = draw.one_of(find_choices(draw.site))
         goal = np.logical_or.reduce([draw.site.cells_of(room) for room in rooms])
         start = draw.start(without=goal)
         names = [room.room.name for room in rooms]
@@ -41,63 +38,47 @@ def _room_task(name: str, choose: Choose) -> Task:
     return Task(
         name=name,
         draw=draw,
-        judge=_judge,
-        is_offered=lambda site: choose(site, None) is not None,
+        judge=lambda site, truth, evidence: judge_room(site, evidence, truth["rooms"]),
+        is_offered=lambda site: bool(find_choices(site)),
     )
 
 
-def _judge(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    return judge_room(site, evidence, truth["rooms"])
-
-
-def _smallest(site: GroundTruth, _random: np.random.Generator | None) -> Choice | None:
+def _smallest(site: GroundTruth) -> list[Choice]:
     """Return the paper's Task 2: the least floor, whether or not furniture counts as floor."""
     rooms = _of_class(site, RoomClass.ROOM)
     if len(rooms) < 2:
-        return None
-    areas: tuple[Callable[[MeasuredRoom], float], ...] = (
-        site.floor_area_m2,
-        lambda room: room.free_area_m2,
-    )
-    right = {
-        room.room.name: room
-        for area in areas
-        for room in rooms
-        if area(room) <= SAME_SIZE * min(map(area, rooms))
-    }
-    return "Go to the smallest room.", tuple(right.values())
+        return []
+    least_m2 = min(map(site.floor_area_m2, rooms)), min(room.free_area_m2 for room in rooms)
+    by_floor = [room for room in rooms if site.floor_area_m2(room) <= SAME_SIZE * least_m2[0]]
+    by_free = [room for room in rooms if room.free_area_m2 <= SAME_SIZE * least_m2[1]]
+    right = {room.room.name: room for room in (*by_floor, *by_free)}
+    return [("Go to the smallest room.", tuple(right.values()))]
 
 
-def _largest(site: GroundTruth, _random: np.random.Generator | None) -> Choice | None:
+def _largest(site: GroundTruth) -> list[Choice]:
     rooms = _rooms_and_halls(site)
     if len(rooms) < 2 or not _is_clear(site, rooms, len(rooms) - 1):
-        return None
-    return f"Go to the largest room. {HALLS_COUNT}", (rooms[-1],)
+        return []
+    return [(f"Go to the largest room. {HALLS_COUNT}", (rooms[-1],))]
 
 
-def _nth(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
+def _nth(site: GroundTruth) -> list[Choice]:
     """Return the second to fourth from either end, where its size is clearly its own."""
     rooms = _rooms_and_halls(site)
-    found = [
-        (f"{ORDINALS[number]} {word}", rooms[at])
+    return [
+        (f"Go to the {ORDINALS[number]} {word} room. {HALLS_COUNT}", (rooms[at],))
         for number in ORDINALS
         for word, at in (("smallest", number - 1), ("largest", len(rooms) - number))
         if number < len(rooms) and _is_clear(site, rooms, at)
     ]
-    if not found:
-        return None
-    words, room = found[0 if random is None else int(random.integers(len(found)))]
-    return f"Go to the {words} room. {HALLS_COUNT}", (room,)
 
 
-def _longest_corridor(site: GroundTruth, _random: np.random.Generator | None) -> Choice | None:
+def _longest_corridor(site: GroundTruth) -> list[Choice]:
     corridors = sorted(_of_class(site, RoomClass.CORRIDOR), key=_length_m)
-    is_clear = len(corridors) < 2 or (
-        _length_m(corridors[-1]) >= CLEARLY_DIFFERENT * _length_m(corridors[-2])
-    )
-    if not corridors or not is_clear:
-        return None
-    return "Go to the longest corridor.", (corridors[-1],)
+    longest_m = [_length_m(corridor) for corridor in corridors[-2:]]
+    if not corridors or longest_m[-1] < CLEARLY_DIFFERENT * sum(longest_m[:-1]):
+        return []
+    return [("Go to the longest corridor.", (corridors[-1],))]
 
 
 def _of_class(site: GroundTruth, wanted: RoomClass) -> list[MeasuredRoom]:

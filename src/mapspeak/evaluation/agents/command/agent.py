@@ -19,7 +19,6 @@ from mapspeak.evaluation.agent import (
     Assignment,
     OutOfBudgetError,
     Picture,
-    ServerAccess,
     ToolAnswer,
     ToolClient,
     Witness,
@@ -139,61 +138,53 @@ async def _collect(stream: ByteReceiveStream | None, into: bytearray) -> None:
         del into[:-MOST_BYTES]
 
 
-@dataclass(frozen=True, slots=True)
-class CommandAgent:
-    """Runs a program in a folder of the trial; its variables are passed by name, never written.
+async def run_program(
+    program: Program, thinking: Thinking | None, task: Assignment, tools: ToolClient
+) -> AgentEnd:
+    """Let a program carry out an assignment, in a folder of the trial.
 
-    Attributes:
+    Its variables are passed by name, never written.
+
+    Args:
         thinking: How much it may think; None for as it likes.
+
+    Raises:
+        LinkError: The program failed by itself.
     """
-
-    program: Program
-    name: str
-    thinking: Thinking | None = None
-    connection: ServerAccess = field(default=ServerAccess.COMMAND, kw_only=True)
-
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment.
-
-        Raises:
-            LinkError: The program failed by itself.
-        """
-        program, folder, log = self.program, task.folder / "client", task.folder / "calls.jsonl"
-        server, answer = (*task.server, "--call-log", str(log)), folder / ANSWER
-        folder.mkdir(parents=True, exist_ok=True)
-        program.write_config(server, folder)
-        log.unlink(missing_ok=True)
-        answer.unlink(missing_ok=True)
-        prompt = "\n\n".join(filter(None, (task.system, task.prompt)))
-        command = program.command_line(
-            prompt=prompt, server=server, folder=folder, thinking=self.thinking
+    folder, log = task.folder / "client", task.folder / "calls.jsonl"
+    server, answer = (*task.server, "--call-log", str(log)), folder / ANSWER
+    folder.mkdir(parents=True, exist_ok=True)
+    program.write_config(server, folder)
+    log.unlink(missing_ok=True)
+    answer.unlink(missing_ok=True)
+    prompt = "\n\n".join(filter(None, (task.system, task.prompt)))
+    command = program.command_line(prompt=prompt, server=server, folder=folder, thinking=thinking)
+    names = (*ALWAYS, *program.environment)
+    variables = {name: os.environ[name] for name in names if name in os.environ}
+    run, wall_s = ProgramRun(log, tools.witness), task.limits.wall_s - WRAP_UP_S
+    try:
+        settings = {**variables, **program.settings}
+        await run.carry_out(command, folder=folder, variables=settings, wall_s=wall_s)
+    finally:
+        said, complained = _plain(run.said, variables), _plain(run.complained, variables)
+        (folder / "stdout.txt").write_text(said, encoding="utf-8")
+        (folder / "stderr.txt").write_text(complained, encoding="utf-8")
+    if run.over is not None or run.exit_code is None:
+        why = "It took too long." if run.over is None else str(run.over)
+        return AgentEnd(answer=why, state=TrialState.OUT_OF_BUDGET)
+    if run.exit_code != 0:
+        complaint = (complained.strip() or said.strip())[-LAST_WORDS:]
+        raise LinkError(
+            f"{program.command[0]} ended with status {run.exit_code}: {complaint}",
+            hint="Run it by hand once; it may want a login or other options.",
         )
-        names = (*ALWAYS, *program.environment)
-        variables = {name: os.environ[name] for name in names if name in os.environ}
-        run, wall_s = ProgramRun(log, tools.witness), task.limits.wall_s - WRAP_UP_S
-        try:
-            settings = {**variables, **program.settings}
-            await run.carry_out(command, folder=folder, variables=settings, wall_s=wall_s)
-        finally:
-            said, complained = _plain(run.said, variables), _plain(run.complained, variables)
-            (folder / "stdout.txt").write_text(said, encoding="utf-8")
-            (folder / "stderr.txt").write_text(complained, encoding="utf-8")
-        if run.over is not None or run.exit_code is None:
-            why = "It took too long." if run.over is None else str(run.over)
-            return AgentEnd(answer=why, state=TrialState.OUT_OF_BUDGET)
-        if run.exit_code != 0:
-            complaint = (complained.strip() or said.strip())[-LAST_WORDS:]
-            raise LinkError(
-                f"{program.command[0]} ended with status {run.exit_code}: {complaint}",
-                hint="Run it by hand once; it may want a login or other options.",
-            )
-        if not run.n_heard:
-            raise LinkError(
-                f"{program.command[0]} has called no tool.",
-                hint="It may not have found the server; see what it said in the folder client.",
-            )
-        last_words = answer.read_bytes() if answer.exists() else b""
-        return program.read_end(said, _plain(last_words, variables))
+    if not run.n_heard:
+        raise LinkError(
+            f"{program.command[0]} has called no tool.",
+            hint="It may not have found the server; see what it said in the folder client.",
+        )
+    last_words = answer.read_bytes() if answer.exists() else b""
+    return program.read_end(said, _plain(last_words, variables))
 
 
 def _find_servers(folder: Path) -> tuple[int, ...]:

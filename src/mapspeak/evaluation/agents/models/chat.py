@@ -21,7 +21,6 @@ from mapspeak.evaluation.agent import (
     Assignment,
     OutOfBudgetError,
     Picture,
-    ServerAccess,
     ToolAnswer,
     ToolClient,
 )
@@ -130,35 +129,29 @@ class _Account:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class ModelAgent:
-    """Lets a model work with the tools until it has nothing more to call."""
+async def work_with_model(begin: Begin, task: Assignment, tools: ToolClient) -> AgentEnd:
+    """Let a model work with the tools until it has nothing more to call.
 
-    begin: Begin
-    name: str
-    connection: ServerAccess = field(default=ServerAccess.STDIO, kw_only=True)
+    Also out of budget it says what it has cost.
 
-    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carry out the assignment; also out of budget it says what it has cost.
-
-        Raises:
-            LinkError: There is nothing to call, or the model cannot be asked or never answered.
-        """
-        listed = await tools.list_tools()
-        if not listed:
-            raise LinkError("The server offers no tools.", hint="Look at --toolsets.")
-        account = _Account()
-        try:
-            with anyio.move_on_after(task.limits.wall_s - WRAP_UP_S):
-                return await _converse(self.begin(task, listed), tools, account)
-        except OutOfBudgetError as error:
-            return account.end(str(error), TrialState.OUT_OF_BUDGET)
-        if not account.n_turns:
-            raise LinkError(
-                f"{self.name} has not answered once in {task.limits.wall_s:.0f} s.",
-                hint="See whether its server answers at all.",
-            )
-        return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
+    Raises:
+        LinkError: There is nothing to call, or the model cannot be asked or never answered.
+    """
+    listed = await tools.list_tools()
+    if not listed:
+        raise LinkError("The server offers no tools.", hint="Look at --toolsets.")
+    account = _Account()
+    try:
+        with anyio.move_on_after(task.limits.wall_s - WRAP_UP_S):
+            return await _converse(begin(task, listed), tools, account)
+    except OutOfBudgetError as error:
+        return account.end(str(error), TrialState.OUT_OF_BUDGET)
+    if not account.n_turns:
+        raise LinkError(
+            f"The model has not answered once in {task.limits.wall_s:.0f} s.",
+            hint="See whether its server answers at all.",
+        )
+    return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
 
 
 async def _converse(
