@@ -87,7 +87,8 @@ class Setting:
         tools: Single tools besides.
         inspected: The ROS that is asked about instead of the simulated robot, which then is not
             there; None for the simulated robot.
-        truth: What the scorer has to know, as JSON; never shown to an agent but the oracle.
+        truth: What the scorer has to know, as JSON; never shown to an agent but the oracle. Where
+            a right answer needs no drive, it is under "said".
     """
 
     prompt: str

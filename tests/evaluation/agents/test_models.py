@@ -19,6 +19,7 @@ from mapspeak.evaluation.agent import (
 )
 from mapspeak.evaluation.agents.finding import check_agent, find_agent
 from mapspeak.evaluation.agents.models.chat import (
+    AnsweredCalls,
     Begin,
     ModelConversation,
     Reply,
@@ -65,11 +66,9 @@ class Scripted:
         assert "look_at_map" in {tool.name for tool in tools}
         return self
 
-    async def ask(self) -> Reply:
+    async def ask(self, answers: AnsweredCalls) -> Reply:
+        self.heard += answers
         return self.replies.pop(0)
-
-    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
-        self.heard.append((call, answer))
 
 
 LOOK = ToolCallRequest(id="1", tool="look_at_map", arguments={})

@@ -34,9 +34,8 @@ async def answer_by_truth(
 ) -> AgentEnd:
     """Drive to where truth says, and answer what truth says; explore as the script does."""
     truth, driver = setting.truth, ToolDriver(tools)
-    known = _known_answer(truth)
-    if known is not None:
-        return AgentEnd(answer=f"ANSWER: {known}")
+    if "said" in truth:
+        return AgentEnd(answer=f"ANSWER: {truth['said']}")
     if not setting.is_known or not truth:
         return await follow_script(task, tools)
     for goals in _stops(truth, site):
@@ -70,17 +69,6 @@ def _roomiest(site: GroundTruth, cells: Mask) -> list[Pose]:
     best = np.argsort(room, axis=None)[::-1][: MOST_STANDS * 40 : 40]
     rows, cols = np.unravel_index(best[room.flat[best] > 0], room.shape)
     return [Pose(x, y) for x, y in site.grid.points_at(rows, cols).tolist()]
-
-
-def _known_answer(truth: Mapping[str, Any]) -> str | None:
-    """Return the right answer of a question that needs no drive; None for all else."""
-    if "said" in truth:
-        return str(truth["said"])
-    if "number" in truth:
-        return f"{truth['number']} {truth['unit']}".rstrip()
-    if "letters" in truth:
-        return ", ".join(truth["letters"]) or "none"
-    return "unreachable" if truth.get("answer") == "unreachable" else None
 
 
 async def _drive_to_one(driver: ToolDriver, goals: list[Pose]) -> bool:

@@ -57,12 +57,13 @@ def _draw_blocked_way(draw: Draw) -> Setting:
         f"Go to the room around {point_text(site.middle_of(room))}. When you are done, end with "
         f"ANSWER: {THERE} - or, if there is no way into it, with ANSWER: {UNREACHABLE}."
     )
-    answer = {"answer": THERE if math.isfinite(left_m) else UNREACHABLE}
+    # Where there is a way, the answer is to drive it.
+    answer = {} if math.isfinite(left_m) else {"said": UNREACHABLE}
     return _room_setting(draw, prompt, room, crates, start, left_m, answer)
 
 
 def _judge_blocked_way(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
-    if truth["answer"] == THERE:
+    if "said" not in truth:
         return _judge_untouched(site, truth, evidence)
     said = read_word(evidence.answer, (THERE, UNREACHABLE))
     figures = {"n_collisions": float(evidence.last.n_collisions)}

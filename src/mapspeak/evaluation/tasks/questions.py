@@ -58,7 +58,7 @@ def _ask_area(draw: Draw, _start: Pose) -> Question:
         f"How many square metres of free floor, on which nothing stands, has the room, corridor or "
         f"hall around {point_text(middle)}? End with a line of the form ANSWER: 12.3 m2."
     )
-    return text, {"number": round(room.free_area_m2, 2), "unit": "m2", "point": pair(middle)}
+    return text, _number(round(room.free_area_m2, 2), "m2", middle)
 
 
 def _ask_doors(draw: Draw, _start: Pose) -> Question:
@@ -69,7 +69,7 @@ def _ask_doors(draw: Draw, _start: Pose) -> Question:
         f"How many doors or other openings that the robot can drive through has the room around "
         f"{point_text(middle)}? End with a line of the form ANSWER: 2."
     )
-    return text, {"number": n_doors, "unit": "", "point": pair(middle)}
+    return text, _number(n_doors, "", middle)
 
 
 def _closed_rooms(site: GroundTruth) -> list[MeasuredRoom]:
@@ -93,8 +93,10 @@ def _ask_neighbours(draw: Draw, _start: Pose) -> Question:
         f"does one come straight from the one around {point_text(middle)}, through one opening "
         "and no third space? End with a line of the form ANSWER: A, C - or ANSWER: none."
     )
+    letters = [letter for letter, each in choices.items() if each.room.name in beside]
     return text, {
-        "letters": [letter for letter, each in choices.items() if each.room.name in beside],
+        "letters": letters,
+        "said": ", ".join(letters) or "none",
         "point": pair(middle),
         "choices": {letter: pair(each) for letter, each in middles.items()},
     }
@@ -107,7 +109,12 @@ def _ask_way(draw: Draw, start: Pose) -> Question:
         f"How many metres does the robot have to drive from where it stands to {point_text(goal)}? "
         "End with a line of the form ANSWER: 12.3 m."
     )
-    return text, {"number": round(way_m or 0.0, 2), "unit": "m", "point": pair(goal)}
+    return text, _number(round(way_m or 0.0, 2), "m", goal)
+
+
+def _number(number: float, unit: str, point: Point) -> dict[str, Any]:
+    said = f"{number} {unit}".rstrip()
+    return {"number": number, "unit": unit, "said": said, "point": pair(point)}
 
 
 def _judge_number(*, ratio: float, least: float) -> Callable[[GroundTruth, Truth, Evidence], Score]:

@@ -77,19 +77,21 @@ class Reply(TokenCounts):
     state: TrialState = TrialState.FINISHED
 
 
+AnsweredCalls = Sequence[tuple[ToolCallRequest, ToolAnswer]]
+
+
 class ModelConversation(Protocol):
     """The port of models: one conversation, which keeps all that was said in it."""
 
-    async def ask(self) -> Reply:
+    async def ask(self, answers: AnsweredCalls) -> Reply:
         """Return the model's answer to all that was said so far.
+
+        Args:
+            answers: To the calls of its last reply, errors as errors; none in the beginning.
 
         Raises:
             LinkError: The model cannot be reached, or does not take what it was asked.
         """
-        ...
-
-    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
-        """Say what a call was answered, with its pictures, or the error as an error."""
         ...
 
 
@@ -157,9 +159,10 @@ async def work_with_model(begin: Begin, task: Assignment, tools: ToolClient) -> 
 async def _converse(
     conversation: ModelConversation, tools: ToolClient, account: _Account
 ) -> AgentEnd:
+    answers: list[tuple[ToolCallRequest, ToolAnswer]] = []
     n_picture_tokens = 0  # of all pictures said so far: each request has them all
     while True:
-        reply = await conversation.ask()
+        reply = await conversation.ask(answers)
         turn = Turn(
             role="agent",
             # The trial notes the last words.
@@ -173,10 +176,9 @@ async def _converse(
         tools.witness.hear(turn)
         if not reply.calls:
             return account.end(reply.text or INSTEAD[reply.state], reply.state)
-        for call in reply.calls:
-            answer = await _make(tools, call)
+        answers = [(call, await _make(tools, call)) for call in reply.calls]
+        for _, answer in answers:
             n_picture_tokens += sum(map(estimate_picture_tokens, answer.pictures))
-            conversation.tell(call, answer)
 
 
 async def _make(tools: ToolClient, call: ToolCallRequest) -> ToolAnswer:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from mcp_types import Tool
 
-from mapspeak.evaluation.agent import Assignment, ToolAnswer
-from mapspeak.evaluation.agents.models.chat import Reply, ToolCallRequest
+from mapspeak.evaluation.agent import Assignment
+from mapspeak.evaluation.agents.models.chat import AnsweredCalls, Reply, ToolCallRequest
 
 CHARACTERS_PER_TOKEN = 4
 """The mock's tokens; it does not read its pictures."""
@@ -70,8 +70,9 @@ class MockModel:
         self._tools = {tool.name for tool in tools}
         self._heard: list[str] = []
 
-    async def ask(self) -> Reply:
+    async def ask(self, answers: AnsweredCalls) -> Reply:
         """Return what the script says next."""
+        self._heard += [answer.text for _, answer in answers]
         task = self._task
         reply = decide(task.seed, prompt=task.prompt, heard=self._heard, tools=self._tools)
         read = (task.system, task.prompt, *self._heard)
@@ -80,11 +81,6 @@ class MockModel:
             n_input_tokens=sum(map(_count_tokens, read)),
             n_output_tokens=_count_tokens(reply.text),
         )
-
-    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
-        """Remember an answer."""
-        del call
-        self._heard.append(answer.text)
 
 
 def _count_tokens(text: str) -> int:

@@ -28,6 +28,7 @@ from mcp_types import Tool
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agent import Assignment, ToolAnswer
 from mapspeak.evaluation.agents.models.chat import (
+    AnsweredCalls,
     Reply,
     Thinking,
     ToolCallRequest,
@@ -90,8 +91,9 @@ class InspectConversation:
             reasoning_effort=None if thinking is None else thinking.value,
         )
 
-    async def ask(self) -> Reply:
+    async def ask(self, answers: AnsweredCalls) -> Reply:
         """Return the model's answer to all that was said so far."""
+        self._messages += [_as_message(call, answer) for call, answer in answers]
         try:
             output = await self._model.generate(
                 self._messages, tools=self._tools, config=self._config
@@ -126,16 +128,14 @@ class InspectConversation:
             state=_ENDINGS.get(output.stop_reason, TrialState.FINISHED),
         )
 
-    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
-        """Say what a call was answered, with its pictures, or the error as an error."""
-        content: list[Content] = [ContentText(text=answer.text)]
-        for picture in answer.pictures:
-            data = base64.b64encode(picture.data).decode()
-            content.append(ContentImage(image=f"data:{picture.media_type};base64,{data}"))
-        error = ToolCallError("unknown", answer.text) if answer.is_error else None
-        self._messages.append(
-            ChatMessageTool(content=content, tool_call_id=call.id, function=call.tool, error=error)
-        )
+
+def _as_message(call: ToolCallRequest, answer: ToolAnswer) -> ChatMessage:
+    content: list[Content] = [ContentText(text=answer.text)]
+    for picture in answer.pictures:
+        data = base64.b64encode(picture.data).decode()
+        content.append(ContentImage(image=f"data:{picture.media_type};base64,{data}"))
+    error = ToolCallError("unknown", answer.text) if answer.is_error else None
+    return ChatMessageTool(content=content, tool_call_id=call.id, function=call.tool, error=error)
 
 
 _ENDINGS = {
