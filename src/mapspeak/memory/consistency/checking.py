@@ -11,7 +11,7 @@ from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
 from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.sight import BODY_M, OWN_M
-from mapspeak.memory.things.thing import Thing, name_the_same
+from mapspeak.memory.things.thing import NOISE, Thing, name_the_same
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray
@@ -80,10 +80,9 @@ def _check(found: Things, stand: Waypoint, landmark: Landmark) -> tuple[FindingK
         return (FindingKind.THROUGH_UNKNOWN, open_m) if is_beyond else None
     if landmark.range_m is None:
         return None
-    noise = found.sight.noise
-    spread_m = noise.range_m + noise.range_ratio * landmark.range_m
+    spread_m = NOISE.range_m + NOISE.range_ratio * landmark.range_m
     # How far one sees at most within the noise of the direction.
-    turns = (-noise.bearing_rad, 0.0, noise.bearing_rad)
+    turns = (-NOISE.bearing_rad, 0.0, NOISE.bearing_rad)
     widest_m = max(_open_m(found, stand, way + turn_rad) for turn_rad in turns)
     is_behind = landmark.range_m > widest_m + BODY_M + N_SIGMAS * spread_m
     return (FindingKind.BEHIND_WALL, open_m) if is_behind else None
@@ -96,7 +95,7 @@ def _open_m(found: Things, stand: Waypoint, way: float) -> float:
 
 def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: float) -> bool:
     grid = found.sight.grid
-    if open_m >= found.sight.noise.reach_m:
+    if open_m >= NOISE.reach_m:
         return False
     pose = waypoint.pose
     end = grid.cell_at(Point(pose.x + open_m * math.cos(way), pose.y + open_m * math.sin(way)))

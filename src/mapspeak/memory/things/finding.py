@@ -12,14 +12,13 @@ from mapspeak.memory.quoting import name_key
 from mapspeak.memory.things.joining import (
     Group,
     Posteriors,
-    SameName,
     group_names,
     join_sightings,
 )
 from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_waypoints
 from mapspeak.memory.things.placing import Placement, measure_agreement, place, trust_range
 from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
-from mapspeak.memory.things.thing import NOISE, Category, NoiseModel, Thing, View, name_the_same
+from mapspeak.memory.things.thing import Category, Thing, View, name_the_same
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 
@@ -84,50 +83,43 @@ def find_things(
     semantic_map: SemanticMap,
     grid: OccupancyGrid,
     *,
-    same_name: SameName = name_the_same,
-    noise: NoiseModel = NOISE,
     earlier: Things | None = None,
 ) -> Things:
     """Join what was seen from all places into things, and say where each is.
 
     Args:
-        same_name: True for two labels that may be one thing's.
-        noise: What is believed of observers.
-        earlier: What was found before, for the same map and names: what depends on no changed
-            waypoint is taken from it. The answer is the same without.
+        earlier: What was found before: what depends on no changed waypoint is taken from it where
+            the map is the same. The answer is the same without.
     """
-    if earlier is None or not _is_of(earlier.sight, grid, noise):
+    if earlier is None or not _is_of(earlier.sight, grid):
         earlier = None
-    sight = earlier.sight if earlier else build_sight_map(grid, noise=noise)
+    sight = earlier.sight if earlier else build_sight_map(grid)
     surroundings = read_waypoints(
         sight, semantic_map.waypoints, earlier.surroundings if earlier else {}
     )
     found = Things(things=(), sight=sight, surroundings=surroundings, pools={})
     known = earlier.pools if earlier else {}
     pools = {
-        pool: known.get(pool) or _describe(found, _solve(sight, pool, same_name), same_name)
-        for pool in _divide(surroundings, same_name)
+        pool: known.get(pool) or _describe(found, _solve(sight, pool))
+        for pool in _divide(surroundings)
     }
     things = (thing for pool in pools.values() for thing in pool)
     return replace(found, things=tuple(sorted(things, key=_rank)), pools=pools)
 
 
-def _is_of(sight: SightMap, grid: OccupancyGrid, noise: NoiseModel) -> bool:
+def _is_of(sight: SightMap, grid: OccupancyGrid) -> bool:
     old = sight.grid
     is_same_frame = old.resolution_m == grid.resolution_m and old.origin == grid.origin
-    is_same = old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
-    return is_same and sight.noise == noise
+    return old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
 
 
-def _divide(
-    surroundings: dict[Waypoint, Surroundings], same_name: SameName
-) -> list[tuple[WeighedView, ...]]:
+def _divide(surroundings: dict[Waypoint, Surroundings]) -> list[tuple[WeighedView, ...]]:
     """Return all sightings in pools of related labels, in an order that the file does not set."""
     ordered = sorted(surroundings, key=_order)
     every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
     pool_of = {
         label: i
-        for i, group in enumerate(group_names([s.landmark.label for s in every], same_name))
+        for i, group in enumerate(group_names([s.landmark.label for s in every]))
         for label in group
     }
     pools: dict[int, list[WeighedView]] = {}
@@ -141,21 +133,17 @@ def _order(waypoint: Waypoint) -> tuple[str, str, float, float, float]:
     return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad
 
 
-def _solve(
-    sight: SightMap, pool: Sequence[WeighedView], same_name: SameName
-) -> tuple[Located, ...]:
+def _solve(sight: SightMap, pool: Sequence[WeighedView]) -> tuple[Located, ...]:
     placed = [each for each in pool if each.likelihood is not None]
     posteriors = Posteriors(sight)
-    groups = join_sightings(posteriors, placed, same_name) if placed else []
+    groups = join_sightings(posteriors, placed) if placed else []
     agreed = [measure_agreement(sight, group) for group in groups]
     located = [
         (group, _place(posteriors, _agreeing(group, shares)))
         for group, shares in zip(groups, agreed, strict=True)
     ]
     lost: list[Group] = [
-        [each]
-        for each in pool
-        if each.likelihood is None and not _add_to_nearest(located, each, same_name)
+        [each] for each in pool if each.likelihood is None and not _add_to_nearest(located, each)
     ]
     return (
         *(
@@ -185,9 +173,7 @@ def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
     return kept if len(kept) >= 2 else group
 
 
-def _add_to_nearest(
-    located: list[tuple[Group, Placement]], sighting: WeighedView, same_name: SameName
-) -> bool:
+def _add_to_nearest(located: list[tuple[Group, Placement]], sighting: WeighedView) -> bool:
     """Add a view without a direction to the nearest thing of its name; False where none is."""
     here = sighting.waypoint.pose.point
     near = [
@@ -195,7 +181,7 @@ def _add_to_nearest(
         for i, (group, placement) in enumerate(located)
         if all(
             each.waypoint is not sighting.waypoint
-            and same_name(each.landmark.label, sighting.landmark.label)
+            and name_the_same(each.landmark.label, sighting.landmark.label)
             for each in group
         )
     ]
@@ -206,14 +192,12 @@ def _add_to_nearest(
     return True
 
 
-def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> tuple[Thing, ...]:
+def _describe(found: Things, pool: Sequence[Located]) -> tuple[Thing, ...]:
     alone = [each for each in pool if len(each.group) == 1 and each.placement is not None]
-    return tuple(_describe_one(each, _against(found, each, alone, same_name)) for each in pool)
+    return tuple(_describe_one(each, _against(found, each, alone)) for each in pool)
 
 
-def _against(
-    found: Things, located: Located, alone: Sequence[Located], same_name: SameName
-) -> list[WeighedView]:
+def _against(found: Things, located: Located, alone: Sequence[Located]) -> list[WeighedView]:
     """Find lone views of the name, from where the thing is in plain sight, that point past it."""
     if located.placement is None or len(located.group) < 2:
         return []
@@ -225,7 +209,7 @@ def _against(
         and other.landmark.bearing_rad is not None
         and other.waypoint.pose.point.distance_to(position) <= PLAIN_SIGHT_M
         and _off_rad(other, position) >= ELSEWHERE_RAD
-        and same_name(other.landmark.label, located.group[0].landmark.label)
+        and name_the_same(other.landmark.label, located.group[0].landmark.label)
         and found.is_in_plain_sight(other.waypoint, position)
     ]
 

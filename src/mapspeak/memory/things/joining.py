@@ -6,8 +6,7 @@ two, and none whose range puts it elsewhere. What is left votes again. Then ever
 to the thing that explains it best, and things that are better explained as one are joined.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -21,10 +20,10 @@ from mapspeak.memory.things.placing import (
     log_evidence,
 )
 from mapspeak.memory.things.sight import SightMap, find_log_priors
+from mapspeak.memory.things.thing import name_the_same
 from mapspeak.memory.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
-SameName = Callable[[str, str], bool]
 Group = list[WeighedView]
 
 LEAST_RATIO = 1.0
@@ -35,23 +34,35 @@ _THINGS_PER_CELL = 0.01
 """Of one name: about one on twenty metres of wall, in cells of the lattice."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Ballot:
-    """The votes of all views of a pool, sorted by cell.
+    """The votes of all views of a pool, sorted by cell, and what is left of them.
 
     Attributes:
         places: Lattice cells that any view speaks of, rising.
-        at: For each vote, the index of its place.
         voters: For each vote, the index of its view.
         ratios: How much likelier the view makes the place.
         starts: Where the votes of each place begin; one more at the end.
     """
 
-    places: IntArray
-    at: IntArray
-    voters: IntArray
-    ratios: FloatArray
-    starts: IntArray
+    def __init__(self, sight: SightMap, sightings: Sequence[WeighedView]) -> None:
+        likelihoods = [likelihood_of(each) for each in sightings]
+        cells = np.concatenate([each.cells for each in likelihoods])
+        order = np.argsort(cells, kind="stable")
+        sizes = [len(each.cells) for each in likelihoods]
+        self.places, starts = np.unique(cells[order], return_index=True)
+        self.starts: IntArray = np.append(starts, len(cells))
+        self.voters: IntArray = np.repeat(np.arange(len(sizes)), sizes)[order]
+        self.ratios: FloatArray = np.concatenate([each.ratios for each in likelihoods])[order]
+        self._n_left = np.diff(self.starts)
+        self._at = np.repeat(np.arange(len(self.places)), self._n_left)
+        self._weights = np.log1p(self.ratios)
+        self._by_voter = np.argsort(self.voters, kind="stable")
+        self._ends = np.searchsorted(self.voters[self._by_voter], np.arange(len(sizes) + 1))
+        log_priors = find_log_priors(sight, self.places, (each.update for each in likelihoods))
+        n_places = len(self.places)
+        self._votes: FloatArray = log_priors + np.bincount(
+            self._at, weights=self._weights, minlength=n_places
+        )
 
     def votes_at(self, indices: IntArray) -> IntArray:
         """Return the numbers of the votes for some places."""
@@ -59,31 +70,41 @@ class _Ballot:
         first = np.repeat(self.starts[indices] - np.cumsum(sizes) + sizes, sizes)
         return first + np.arange(int(sizes.sum()))
 
+    def find_best(self) -> int | None:
+        """Return the index of the place with most votes; None when no vote is left."""
+        best = int(np.argmax(self._votes))
+        return best if np.isfinite(self._votes[best]) else None
 
-def group_names(labels: Sequence[str], same_name: SameName) -> list[frozenset[str]]:
+    def take_out(self, voter: int) -> None:
+        """Take all votes of one view out."""
+        mine = self._by_voter[self._ends[voter] : self._ends[voter + 1]]
+        at = self._at[mine]
+        self._votes[at] -= self._weights[mine]
+        self._n_left[at] -= 1
+        self._votes[at[self._n_left[at] == 0]] = -np.inf
+
+    def strike(self, places: IntArray) -> None:
+        """Take places out at which nothing that is left can be."""
+        self._votes[places] = -np.inf
+
+
+def group_names(labels: Sequence[str]) -> list[frozenset[str]]:
     """Return labels that may, over others, name the same; each label is in one group."""
     groups: list[set[str]] = []
     for label in sorted(set(labels)):
-        mine = [group for group in groups if any(same_name(label, other) for other in group)]
+        mine = [group for group in groups if any(name_the_same(label, other) for other in group)]
         groups = [group for group in groups if group not in mine]
         groups.append({label}.union(*mine))
     return [frozenset(group) for group in groups]
 
 
-def join_sightings(
-    posteriors: "Posteriors", sightings: Sequence[WeighedView], same_name: SameName
-) -> list[Group]:
-    """Divide views of one name into groups: one for each thing.
-
-    Args:
-        sightings: Views whose labels are related, each with a likelihood.
-        same_name: True for two labels that may be one thing's.
-    """
-    ballot = _count(sightings)
-    groups = _take_peaks(posteriors.sight, sightings, ballot, same_name)
+def join_sightings(posteriors: "Posteriors", sightings: Sequence[WeighedView]) -> list[Group]:
+    """Divide views whose labels are related, each with a likelihood: one group for each thing."""
+    ballot = _Ballot(posteriors.sight, sightings)
+    groups = _take_peaks(posteriors.sight, sightings, ballot)
     for _ in range(N_SWEEPS):
-        groups = _sweep(posteriors, sightings, groups, ballot, same_name)
-    return _merge(posteriors, groups, same_name)
+        groups = _sweep(posteriors, sightings, groups, ballot)
+    return _merge(posteriors, groups)
 
 
 class Posteriors:
@@ -101,76 +122,24 @@ class Posteriors:
         return self._known[key]
 
 
-def _count(sightings: Sequence[WeighedView]) -> _Ballot:
-    likelihoods = [likelihood_of(each) for each in sightings]
-    cells = np.concatenate([each.cells for each in likelihoods])
-    sizes = [len(each.cells) for each in likelihoods]
-    order = np.argsort(cells, kind="stable")
-    places, starts = np.unique(cells[order], return_index=True)
-    counts = np.diff(np.append(starts, len(cells)))
-    return _Ballot(
-        places=places,
-        at=np.repeat(np.arange(len(places)), counts),
-        voters=np.repeat(np.arange(len(sizes)), sizes)[order],
-        ratios=np.concatenate([each.ratios for each in likelihoods])[order],
-        starts=np.append(starts, len(cells)),
-    )
-
-
-def _take_peaks(
-    sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ballot, same_name: SameName
-) -> list[Group]:
-    updates = (likelihood_of(each).update for each in sightings)
-    count = _Count(ballot, find_log_priors(sight, ballot.places, updates))
+def _take_peaks(sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ballot) -> list[Group]:
     is_left = np.ones(len(sightings), dtype=np.bool_)
     groups = []
-    while is_left.any() and (best := count.find_best()) is not None:
+    while is_left.any() and (best := ballot.find_best()) is not None:
         near = _around(sight, ballot, best)
         said = ballot.votes_at(near)
         ratios = np.zeros(len(sightings))
         np.maximum.at(ratios, ballot.voters[said], ballot.ratios[said])
         ratios[~is_left] = 0.0
-        chosen = _choose(sightings, ratios, same_name)
+        chosen = _choose(sightings, ratios)
         if not chosen:
-            count.strike(near)
+            ballot.strike(near)
             continue
         groups.append([sightings[i] for i in chosen])
         is_left[chosen] = False
         for i in chosen:
-            count.take_out(i)
+            ballot.take_out(i)
     return groups + [[sightings[i]] for i in np.flatnonzero(is_left).tolist()]
-
-
-class _Count:
-    """The votes that are left."""
-
-    def __init__(self, ballot: _Ballot, log_priors: FloatArray) -> None:
-        n_places = len(ballot.places)
-        self._at = ballot.at
-        self._weights = np.log1p(ballot.ratios)
-        self._order = np.argsort(ballot.voters, kind="stable")
-        n_voters = int(ballot.voters.max()) + 1
-        self._ends = np.searchsorted(ballot.voters[self._order], np.arange(n_voters + 1))
-        self._n_left = np.bincount(ballot.at, minlength=n_places)
-        votes = np.bincount(ballot.at, weights=self._weights, minlength=n_places)
-        self._votes: FloatArray = votes + log_priors
-
-    def find_best(self) -> int | None:
-        """Return the index of the place with most votes; None when no vote is left."""
-        best = int(np.argmax(self._votes))
-        return best if np.isfinite(self._votes[best]) else None
-
-    def take_out(self, voter: int) -> None:
-        """Take all votes of one view out."""
-        mine = self._order[self._ends[voter] : self._ends[voter + 1]]
-        at = self._at[mine]
-        self._votes[at] -= self._weights[mine]
-        self._n_left[at] -= 1
-        self._votes[at[self._n_left[at] == 0]] = -np.inf
-
-    def strike(self, places: IntArray) -> None:
-        """Take places out at which nothing that is left can be."""
-        self._votes[places] = -np.inf
 
 
 def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
@@ -183,22 +152,22 @@ def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
     return np.asarray(found[ballot.places[found] == cells], dtype=np.intp)
 
 
-def _choose(sightings: Sequence[WeighedView], ratios: FloatArray, same_name: SameName) -> list[int]:
+def _choose(sightings: Sequence[WeighedView], ratios: FloatArray) -> list[int]:
     """Return the views that speak of a place, the strongest first, one from each pose."""
     chosen: list[int] = []
     for i in np.argsort(-ratios, kind="stable").tolist():
         if ratios[i] < LEAST_RATIO:
             break
-        if _fits(sightings[i], (sightings[j] for j in chosen), same_name):
+        if _fits(sightings[i], (sightings[j] for j in chosen)):
             chosen.append(i)
     return chosen
 
 
-def _fits(sighting: WeighedView, members: Iterator[WeighedView], same_name: SameName) -> bool:
+def _fits(sighting: WeighedView, members: Iterator[WeighedView]) -> bool:
     return all(
         not _are_of_one_look(sighting.waypoint, other.waypoint)
         and not are_apart(sighting.spot, other.spot)
-        and same_name(sighting.landmark.label, other.landmark.label)
+        and name_the_same(sighting.landmark.label, other.landmark.label)
         for other in members
     )
 
@@ -216,7 +185,6 @@ def _sweep(
     sightings: Sequence[WeighedView],
     groups: list[Group],
     ballot: _Ballot,
-    same_name: SameName,
 ) -> list[Group]:
     """Return every view to the thing that explains it best; what is alone may join another."""
     ratios = np.zeros((len(sightings), len(groups)))
@@ -230,7 +198,7 @@ def _sweep(
     rows, cols = np.nonzero(ratios >= LEAST_RATIO)
     for k in np.argsort(-ratios[rows, cols], kind="stable").tolist():
         i, j = int(rows[k]), int(cols[k])
-        if is_left[i] and _fits(sightings[i], iter(taken[j]), same_name):
+        if is_left[i] and _fits(sightings[i], iter(taken[j])):
             taken[j].append(sightings[i])
             is_left[i] = False
     alone = [[sightings[i]] for i in np.flatnonzero(is_left).tolist()]
@@ -248,7 +216,7 @@ def _explain(ballot: _Ballot, posterior: Posterior, n_views: int) -> FloatArray:
     return np.asarray(explained, dtype=np.float64)
 
 
-def _merge(posteriors: Posteriors, groups: list[Group], same_name: SameName) -> list[Group]:
+def _merge(posteriors: Posteriors, groups: list[Group]) -> list[Group]:
     """Join things that are better explained as one, the nearest first."""
     sight = posteriors.sight
     middles = [find_middle(sight, posteriors.of(group)) for group in groups]
@@ -260,14 +228,14 @@ def _merge(posteriors: Posteriors, groups: list[Group], same_name: SameName) -> 
     merged = dict(enumerate(groups))
     for _, i, j in pairs:
         a, b = owner[i], owner[j]
-        if a != b and _are_one(sight, merged[a], merged[b], same_name):
+        if a != b and _are_one(sight, merged[a], merged[b]):
             merged[b] = merged[b] + merged.pop(a)
             owner = [b if each == a else each for each in owner]
     return list(merged.values())
 
 
-def _are_one(sight: SightMap, some: Group, others: Group, same_name: SameName) -> bool:
-    if not all(_fits(each, iter(others), same_name) for each in some):
+def _are_one(sight: SightMap, some: Group, others: Group) -> bool:
+    if not all(_fits(each, iter(others)) for each in some):
         return False
     apart = log_evidence(sight, some) + log_evidence(sight, others) + np.log(_THINGS_PER_CELL)
     return bool(log_evidence(sight, some + others) > apart)

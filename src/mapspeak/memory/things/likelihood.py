@@ -15,7 +15,7 @@ from mapspeak.memory.things.sight import (
     correct_by_laser,
     look_around,
 )
-from mapspeak.memory.things.thing import Category, NoiseModel
+from mapspeak.memory.things.thing import NOISE, Category
 from mapspeak.memory.waypoint import Landmark, Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
@@ -37,15 +37,15 @@ class RangedSpot:
     yy: float
 
 
-def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> RangedSpot | None:
+def find_spot(pose: Pose, landmark: Landmark) -> RangedSpot | None:
     """Return where a landmark says that its thing is; None without a direction or a range."""
     if landmark.bearing_rad is None or landmark.range_m is None:
         return None
     way, far_m = pose.yaw_rad + landmark.bearing_rad, landmark.range_m
     # A range ends at the surface or in the middle of a thing; nobody says which.
     body = (BODY_M / 2) ** 2
-    along = (noise.range_m + noise.range_ratio * far_m) ** 2 + body
-    across = (noise.bearing_rad * far_m) ** 2 + body
+    along = (NOISE.range_m + NOISE.range_ratio * far_m) ** 2 + body
+    across = (NOISE.bearing_rad * far_m) ** 2 + body
     cos, sin = math.cos(way), math.sin(way)
     return RangedSpot(
         point=Point(pose.x + far_m * cos, pose.y + far_m * sin),
@@ -130,7 +130,7 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
         cells=(rows + low[0]) * sight.rows.shape[1] + cols + low[1],
         angles=angles[is_far],
         ranges_m=ranges_m[is_far],
-        sight=np.where(is_near[is_far], 1.0, sight.noise.seen_over_ratio),
+        sight=np.where(is_near[is_far], 1.0, NOISE.seen_over_ratio),
         near_m=near_m,
     )
 
@@ -144,7 +144,7 @@ def weigh_view(
     cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
     update = None
     if landmark.bearing_rad is not None:
-        sigma = sight.noise.bearing_rad
+        sigma = NOISE.bearing_rad
         ahead = pose.yaw_rad + landmark.bearing_rad - sight.grid.origin.yaw_rad
         off = np.abs(np.remainder(outlook.angles - ahead + math.pi, math.tau) - math.pi)
         near = np.flatnonzero(off <= _FARTHEST_SIGMAS * sigma)
@@ -163,16 +163,15 @@ def weigh_view(
             )
         ratios = ratios * bell
     if landmark.range_m is not None:
-        ratios = ratios * _weigh_range(sight, ranges_m, landmark.range_m)
+        ratios = ratios * _weigh_range(ranges_m, landmark.range_m)
     return ViewLikelihood(cells=cells, ratios=ratios, update=update)
 
 
-def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatArray:
-    noise = sight.noise
-    sigma = noise.range_m + noise.range_ratio * ranges_m
+def _weigh_range(ranges_m: FloatArray, told_m: float) -> FloatArray:
+    sigma = NOISE.range_m + NOISE.range_ratio * ranges_m
     bell = np.exp(-0.5 * ((told_m - ranges_m) / sigma) ** 2) / (sigma * math.sqrt(math.tau))
-    wrong = noise.wrong_range_ratio
-    return np.asarray((1 - wrong) * bell * noise.reach_m + wrong, dtype=np.float64)
+    wrong = NOISE.wrong_range_ratio
+    return np.asarray((1 - wrong) * bell * NOISE.reach_m + wrong, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -246,9 +245,9 @@ def _read(
                     waypoint=waypoint,
                     landmark=landmark,
                     category=category,
-                    wrong_ratio=sight.noise.wrong_ratio_of(landmark.confidence),
+                    wrong_ratio=NOISE.wrong_ratio_of(landmark.confidence),
                     likelihood=likelihood if likelihood and np.any(likelihood.ratios) else None,
-                    spot=find_spot(waypoint.pose, landmark, sight.noise),
+                    spot=find_spot(waypoint.pose, landmark),
                 )
             )
     return Surroundings(near_m=near_m, far_m=far_m, sightings=tuple(sightings))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Pose
 from mapspeak.memory.laserfan import LaserFan
-from mapspeak.memory.things.thing import NOISE, NoiseModel
+from mapspeak.memory.things.thing import NOISE
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.visibility import measure_sight
@@ -59,7 +59,6 @@ class SightMap:
     log_prior: FloatArray
     rows: FloatArray
     cols: FloatArray
-    noise: NoiseModel
 
     def cast(
         self,
@@ -80,12 +79,12 @@ class SightMap:
             reach_m: Farther ones do not, either; as far as anybody names things where None.
         """
         size_m = self.grid.resolution_m
-        reach_m = self.noise.reach_m if reach_m is None else reach_m
+        reach_m = NOISE.reach_m if reach_m is None else reach_m
         reached = measure_sight(off, places, angles, begin=begin_m / size_m, reach=reach_m / size_m)
         return reached * size_m
 
 
-def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightMap:
+def build_sight_map(grid: OccupancyGrid) -> SightMap:
     """Make a map ready: what blocks sight, and where things may stand."""
     # Nobody sees into furniture, so that its inside is unknown, too.
     blocked = (grid.occupied & ~_small_parts(grid, grid.occupied)) | (
@@ -93,7 +92,7 @@ def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightM
     )
     factor = max(round(LATTICE_M / grid.resolution_m), 1)
     shares, rows, cols = _summarise(grid.occupied, factor)
-    on_floor = math.log(min(noise.floor_per_m * factor * grid.resolution_m, 1.0))
+    on_floor = math.log(min(NOISE.floor_per_m * factor * grid.resolution_m, 1.0))
     return SightMap(
         grid=grid,
         obstacle_off=_off(grid.occupied | grid.unknown),
@@ -102,7 +101,6 @@ def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightM
         log_prior=np.where(shares > 0, 0.0, on_floor),
         rows=rows,
         cols=cols,
-        noise=noise,
     )
 
 
@@ -209,14 +207,13 @@ def correct_by_laser(
     beam, far_m, cells = number[inside], ranges_m[inside], cells[inside]
     behind_m = far_m - end_m[beam]
     log_priors = sight.log_prior.ravel()[cells]
-    noise = sight.noise
-    met = np.exp(-0.5 * (behind_m / noise.laser_m) ** 2) * (noise.laser_met_ratio * is_new[beam])
+    met = np.exp(-0.5 * (behind_m / NOISE.laser_m) ** 2) * (NOISE.laser_met_ratio * is_new[beam])
     likelier = np.log(np.exp(log_priors) + (1 - np.exp(log_priors)) * met)
-    is_passed = is_through[beam] & (behind_m < -noise.laser_update_m) & (log_priors == 0.0)
-    told = np.where(is_passed, math.log(noise.laser_through_ratio), likelier)
+    is_passed = is_through[beam] & (behind_m < -NOISE.laser_update_m) & (log_priors == 0.0)
+    told = np.where(is_passed, math.log(NOISE.laser_through_ratio), likelier)
     kept = is_passed | (met > _LEAST_MET)
     seen = seen.copy()
-    seen[inside] = np.where(behind_m <= BODY_M, 1.0, noise.seen_over_ratio)
+    seen[inside] = np.where(behind_m <= BODY_M, 1.0, NOISE.seen_over_ratio)
     return LaserUpdate(cells=cells[kept], log_priors=told[kept]), seen
 
 
@@ -257,8 +254,8 @@ def _compare(
     rays = bearing_index(angles)
     # An edge of what stands there may lie on either side of a beam.
     beside_m = np.max([near_m[(rays + step) % N_RAYS] for step in _BESIDE], axis=0)
-    update_m = sight.noise.laser_update_m
-    is_past = (end_m > beside_m + update_m) & (beside_m < sight.noise.reach_m)
+    update_m = NOISE.laser_update_m
+    is_past = (end_m > beside_m + update_m) & (beside_m < NOISE.reach_m)
     # One beam alone has slipped past a corner or through a gap that the map has closed.
     has_past_beside = np.zeros_like(is_past)
     has_past_beside[1:] |= is_past[:-1]
