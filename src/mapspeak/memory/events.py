@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory.policy import tells_what_to_do
 from mapspeak.memory.quoting import clean_line, name_key, quote
 
@@ -120,6 +120,14 @@ class Event:
         """Return True while it lasts; `now` has a zone."""
         has_begun = self.begins is None or self.begins <= now
         return has_begun and (self.until is None or now < self.until)
+
+    def moved(self, motion: Pose) -> "Event":
+        """Return it in another frame, by the transform from the present one to that."""
+        return replace(
+            self,
+            at=None if self.at is None else motion.transform(self.at),
+            outlines=tuple(tuple(map(motion.transform, outline)) for outline in self.outlines),
+        )
 
     @property
     def told_text(self) -> str:

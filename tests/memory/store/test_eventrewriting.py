@@ -90,7 +90,7 @@ def test_a_move_and_its_inverse_leave_all_where_it_was(
 
     assert there.find_entry("snapshot") == "map-2.yaml"
     for one, other in zip(document.records.values(), back.records.values(), strict=True):
-        before, after = one.reading.waypoint, other.reading.waypoint
+        before, after = one.waypoint, other.waypoint
         # Hundredths of a degree and millimetres are what the file holds.
         assert after.pose.point.distance_to(before.pose.point) < 0.01 + 1e-3 * abs(motion.x)
         said, again = record_data(before), record_data(after)
@@ -116,4 +116,4 @@ def test_the_files_own_keys_are_changed_wherever_they_stand() -> None:
     assert after.map_id == "b2"
     assert after.find_entry("snapshot") == "map-2.yaml"
     assert after.text.count("map: ") == 1
-    assert after.records["dock"].reading.waypoint.pose == Pose(2.0, 2.0, 0.0)
+    assert after.records["dock"].waypoint.pose == Pose(2.0, 2.0, 0.0)

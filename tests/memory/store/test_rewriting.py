@@ -234,6 +234,12 @@ def test_line_ends_and_the_byte_order_mark_of_windows_stay() -> None:
     assert content.count("\n") == content.count("\r\n") > 3
 
 
+def test_lines_of_a_file_with_both_ends_end_as_most_did() -> None:
+    text = "# mine\n# ours\nwaypoints: []\r\n"
+
+    assert "\r" not in with_waypoint(document(text), place("a")).content.decode()
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -5,10 +5,9 @@ A YAML parser needs a second for a thousand waypoints. So the text is cut at the
 way is read as a whole, slowly.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from operator import add
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 from pydantic import ValidationError
 
@@ -16,13 +15,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
 from mapspeak.memory.quoting import name_key, quote_name
 from mapspeak.memory.store.eventschema import read_events
-from mapspeak.memory.store.layout import (
-    Layout,
-    LineEnds,
-    find_records,
-    read_plain_record,
-    whole,
-)
+from mapspeak.memory.store.layout import Layout, find_records, read_plain_record, whole
 from mapspeak.memory.store.schema import (
     fault_in,
     find_misspelt_keys,
@@ -47,8 +40,8 @@ _MAX_WARNINGS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """What the text of one record says, kept so that it need not be read again.
+class Record:
+    """What a record says and where it stands in the text.
 
     Attributes:
         key: The `name_key` of its name.
@@ -58,13 +51,6 @@ class Reading:
     waypoint: Waypoint
     key: str
     misspelt: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """What a record says and where it stands in the text."""
-
-    reading: Reading
     start: int
     end: int
 
@@ -85,7 +71,7 @@ class MapDocument:
     Attributes:
         source: How messages call the file.
         text: All of it, with lines that end in a line feed.
-        line_ends: How its lines end.
+        line_end: What most of its lines end in, and all that are written.
         root: Its top mapping without the records; None where the file says nothing.
         layout: Where the records stand in the text.
         records: By `name_key`, in the order of the file.
@@ -96,7 +82,7 @@ class MapDocument:
 
     source: str
     text: str
-    line_ends: LineEnds = field(repr=False)
+    line_end: str = field(repr=False)
     has_bom: bool
     root: MappingNode | None
     layout: Layout
@@ -104,7 +90,6 @@ class MapDocument:
     events: Mapping[str, EventRecord]
     map_id: str | None
     warnings: tuple[str, ...]
-    readings: Mapping[str, Reading] = field(repr=False)
 
     @property
     def content(self) -> bytes:
@@ -118,11 +103,12 @@ class MapDocument:
 
     def encoded(self, text: str) -> bytes:
         """Return a text in the bytes of this file: its line ends, its byte order mark."""
-        return ((_BOM if self.has_bom else "") + self.line_ends.restored(text)).encode()
+        bom = _BOM if self.has_bom else ""
+        return (bom + text.replace("\n", self.line_end)).encode()
 
     def to_map(self) -> SemanticMap:
         """Return the remembered places."""
-        waypoints = tuple(record.reading.waypoint for record in self.records.values())
+        waypoints = tuple(record.waypoint for record in self.records.values())
         return SemanticMap(map_id=self.map_id, waypoints=waypoints, warnings=self.warnings)
 
 
@@ -139,31 +125,30 @@ def parse_document(
         SemanticMapError: It has a fault; the message names the line and the column.
     """
     decoded = _decoded(content, source)
-    text = decoded.removeprefix(_BOM)
-    if "\r" in text:
-        text = text.replace("\r\n", "\n")
+    text = decoded.removeprefix(_BOM).replace("\r\n", "\n")
     try:
         layout, root = _cut(text, previous)
-        map_id = _map_id(root, layout)
-        known = previous.readings if previous and previous.map_id == map_id else {}
-        listed = (Record(_read_node(n, map_id), n.start, n.end) for n in _list_items(root))
-        records = [*_cut_records(text, layout, map_id, known), *listed]
+        with _moved(layout.offset_in_text):
+            map_id = _map_id(root)
+            events = {each.id: (each, node) for each, node in read_events(root)}
+        records = list(_records(text, layout, root, map_id, previous))
         by_key = _by_key(records)
-        events = _events(root, layout)
     except TextError as fault:
         raise _at_its_place(fault, source, text) from fault
     return MapDocument(
         source=source,
         text=text,
-        line_ends=LineEnds.of(decoded.removeprefix(_BOM)),
+        line_end="\r\n" if 2 * decoded.count("\r\n") > decoded.count("\n") else "\n",
         has_bom=decoded.startswith(_BOM),
         root=root,
         layout=layout,
         records=by_key,
-        events=events,
+        events={
+            key: EventRecord(event, *map(layout.offset_in_text, (node.start, node.end)))
+            for key, (event, node) in events.items()
+        },
         map_id=map_id,
         warnings=tuple(_warnings(text, root, records)),
-        readings={text[record.start : record.end]: record.reading for record in records},
     )
 
 
@@ -177,6 +162,15 @@ def _decoded(content: bytes, source: str) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         message = f"{source}, line {line}: byte {error.start} is not UTF-8."
         raise SemanticMapError(message, hint="Save the file with the encoding UTF-8.") from error
+
+
+@contextmanager
+def _moved(place: Callable[[int], int]) -> Iterator[None]:
+    """Tell a fault in a part of the text at its place in the whole."""
+    try:
+        yield
+    except TextError as fault:
+        raise fault.moved(place) from fault
 
 
 def _at_its_place(fault: TextError, source: str, text: str) -> SemanticMapError:
@@ -205,10 +199,8 @@ def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode |
 
 
 def _root(text: str, layout: Layout) -> MappingNode | None:
-    try:
+    with _moved(layout.offset_in_text):
         root = parse_tree(layout.skeleton(text))
-    except TextError as fault:
-        raise fault.moved(layout.offset_in_text) from fault
     if root is None or isinstance(root, MappingNode):
         return root
     raise TextError(
@@ -223,45 +215,45 @@ def _list_items(root: MappingNode | None) -> tuple[Node, ...]:
     return node.items if isinstance(node, ListNode) else ()
 
 
-def _map_id(root: MappingNode | None, layout: Layout) -> str | None:
+def _map_id(root: MappingNode | None) -> str | None:
     if root is None:
         return None
     try:
         return map_id_from(root.data)
     except ValidationError as error:
-        raise fault_in(root, error).moved(layout.offset_in_text) from error
-
-
-def _events(root: MappingNode | None, layout: Layout) -> dict[str, EventRecord]:
-    try:
-        found = read_events(root)
-    except TextError as fault:
-        raise fault.moved(layout.offset_in_text) from fault
-    place = layout.offset_in_text
-    return {
-        event.id: EventRecord(event, place(node.start), place(node.end)) for event, node in found
-    }
+        raise fault_in(root, error) from error
 
 
 # --- records ---------------------------------------------------------------------------------
 
 
-def _cut_records(
-    text: str, layout: Layout, map_id: str | None, known: Mapping[str, Reading]
+def _records(
+    text: str,
+    layout: Layout,
+    root: MappingNode | None,
+    map_id: str | None,
+    previous: MapDocument | None,
 ) -> Iterator[Record]:
+    """Read the records, but for those whose text was read before."""
+    known = {}
+    if previous is not None and previous.map_id == map_id:
+        known = {previous.text[each.start : each.end]: each for each in previous.records.values()}
     for start, end in layout.spans:
         block = text[start:end]
-        try:
-            yield Record(known.get(block) or _read_block(block, map_id), start, end)
-        except TextError as fault:
-            raise fault.moved(partial(add, start)) from fault
+        record = known.get(block)
+        if record is None:
+            with _moved(start.__add__):
+                record = _read_block(block, map_id)
+        yield replace(record, start=start, end=end)
+    for node in _list_items(root):
+        yield _read_node(node, map_id)
 
 
-def _read_block(block: str, map_id: str | None) -> Reading:
+def _read_block(block: str, map_id: str | None) -> Record:
     data = read_plain_record(block)
     if data is not None:
         try:
-            return _reading(data, map_id)
+            return _record(data, map_id, 0, len(block))
         except ValidationError:
             pass  # Read again below, to say where the fault is.
     tree = parse_tree(block)
@@ -275,27 +267,28 @@ def _read_block(block: str, map_id: str | None) -> Reading:
     )
 
 
-def _read_node(node: Node, map_id: str | None) -> Reading:
+def _read_node(node: Node, map_id: str | None) -> Record:
     try:
-        return _reading(node.data, map_id)
+        return _record(node.data, map_id, node.start, node.end)
     except ValidationError as error:
         raise fault_in(node, error) from error
     except SemanticMapError as error:
         raise TextError(error.message, hint=error.hint, offset=node.start) from error
 
 
-def _reading(data: Data, map_id: str | None) -> Reading:
+def _record(data: Data, map_id: str | None, start: int, end: int) -> Record:
     waypoint = waypoint_from(data, map_id=map_id)
-    return Reading(waypoint, name_key(waypoint.name), tuple(find_misspelt_keys(data)))
+    misspelt = tuple(find_misspelt_keys(data))
+    return Record(waypoint, name_key(waypoint.name), misspelt, start, end)
 
 
 def _by_key(records: Iterable[Record]) -> dict[str, Record]:
     by_key: dict[str, Record] = {}
     for record in records:
-        twin = by_key.setdefault(record.reading.key, record)
+        twin = by_key.setdefault(record.key, record)
         if twin is not record:
             raise TextError(
-                f"Two waypoints are called {quote_name(record.reading.waypoint.name)}.",
+                f"Two waypoints are called {quote_name(record.waypoint.name)}.",
                 hint="Rename or remove one of them; case and spaces make no difference.",
                 offset=record.start,
                 other_offset=twin.start,
@@ -306,10 +299,10 @@ def _by_key(records: Iterable[Record]) -> dict[str, Record]:
 def _warnings(text: str, root: MappingNode | None, records: Sequence[Record]) -> Iterator[str]:
     for key, known in find_misspelt_keys_of_file(root.data if root else {}):
         yield f"The key {quote_name(key)} of the file is not used; '{known}' would be."
-    misspelt = [(record, *keys) for record in records for keys in record.reading.misspelt]
+    misspelt = [(record, *keys) for record in records for keys in record.misspelt]
     for record, key, known in misspelt[:_MAX_WARNINGS]:
         line, _ = line_and_column(text, record.start)
-        what = f"{quote_name(key)} of {quote_name(record.reading.waypoint.name)}"
+        what = f"{quote_name(key)} of {quote_name(record.waypoint.name)}"
         yield f"The key {what} (line {line}) is not used; '{known}' would be."
     if len(misspelt) > _MAX_WARNINGS:
         yield f"{len(misspelt) - _MAX_WARNINGS} more keys look misspelt."

@@ -1,5 +1,6 @@
 """A changed file: a record, an event or all places written; every other character as it was."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from mapspeak.errors import SemanticMapError
@@ -19,6 +20,7 @@ from mapspeak.memory.store.tree import (
 from mapspeak.memory.waypoint import Waypoint
 
 _GREETING = "# mapspeak semantic map. Edit freely: comments and order are kept.\n"
+_INDENT = 2
 _OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture")
 
 
@@ -61,11 +63,10 @@ def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
         text = _with_record(document, said)
     else:
         _require_cut(document, record.start)
-        block = document.text[record.start : record.end]
-        changed = edited_record(block, old=record_data(record.reading.waypoint), new=said)
-        text = document.text[: record.start] + changed + document.text[record.end :]
+        change = (record.start, record.end, record_data(record.waypoint), said)
+        text = _edited(document, [change], "waypoints")
     written = _reparsed(document, text, keys={*document.records, key})
-    if record_data(written.records[key].reading.waypoint) != said:
+    if record_data(written.records[key].waypoint) != said:
         raise _layout_error(document, record.start if record else len(document.text))
     return written
 
@@ -84,28 +85,104 @@ def without_waypoint(document: MapDocument, key: str) -> MapDocument:
     return _reparsed(document, before + after, keys=set(document.records) - {key})
 
 
+def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
+    """Return the file with an event written: in its own record if its id is there already.
+
+    Returns:
+        The file, and the event as it reads there, with its id.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    named = event if event.id else replace(event, id=_free_id(document))
+    record = document.events.get(named.id)
+    if record is None:
+        text = _with_new_event(document, event_data(named))
+    else:
+        change = (record.start, record.end, event_data(record.event), event_data(named))
+        text = _edited(document, [change], "events")
+    changed = _reparsed(document, text, list_key="events")
+    written = changed.events.get(named.id)
+    if written is None or event_data(written.event) != event_data(named):
+        raise _layout_error(document, 0, "events")
+    return changed, written.event
+
+
+def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
+    """Return the file with every waypoint and event moved.
+
+    Args:
+        motion: From the frame of its poses to the new one.
+        entries: Keys of the file itself that change with it, such as `map`.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    if document.records:
+        _require_cut(document, 0)
+    after = document
+    for key, value in entries.items():
+        after = with_entry(after, key, value)
+    of_events = [
+        (each.start, each.end, event_data(each.event), event_data(each.event.moved(motion)))
+        for each in after.events.values()
+    ]
+    after = _reparsed(after, _edited(after, of_events, "events"))
+    of_waypoints = [
+        (each.start, each.end, record_data(each.waypoint), record_data(each.waypoint.moved(motion)))
+        for each in after.records.values()
+    ]
+    return _reparsed(after, _edited(after, of_waypoints, "waypoints"))
+
+
+_Change = tuple[int, int, dict[str, Data], dict[str, Data]]
+"""From where to where a record stands, what it says, and what it is to say."""
+
+
+def _edited(document: MapDocument, changes: Iterable[_Change], list_key: str) -> str:
+    """Return the file's text with some records changed: comments and spelling stay."""
+    text, pieces, end = document.text, list[str](), 0
+    for start, stop, old, new in sorted(changes, key=lambda change: change[0]):
+        # As an item of its own, indented as it was.
+        dash = text[text.rfind("\n", 0, start) + 1 : start]
+        if dash.strip(" -"):
+            raise _layout_error(document, start, list_key)
+        item = edited_record(" " * len(dash) + text[start:stop], old=old, new=new)
+        pieces += [text[end:start], item[len(dash) :]]
+        end = stop
+    return "".join([*pieces, text[end:]])
+
+
 def _with_record(document: MapDocument, said: dict[str, Data]) -> str:
     layout, text = document.layout, document.text
     shown = {k: v for k, v in said.items() if v is not None or k not in _OPTIONAL_KEYS}
     record = record_text(shown, indent=layout.indent)
     if not layout.spans:
-        return _with_first_record(document, record)
+        return _with_first_item(document, "waypoints", record)
     last_end = layout.spans[-1][1]
     is_airy = len(layout.spans) < 2 or text[layout.spans[-2][1] :].startswith("\n")
     gap = "\n" if is_airy else ""
     return _ended(text[:last_end]) + gap + record + text[last_end:]
 
 
-def _with_first_record(document: MapDocument, record: str) -> str:
-    text, root = document.text, document.root
-    if root is None:
-        return _ended(text or _GREETING) + f"version: {FILE_VERSION}\nwaypoints:\n{record}"
-    return _with_first_item(document, root, "waypoints", record)
+def _with_new_event(document: MapDocument, said: dict[str, Data]) -> str:
+    listed = document.root.find_value("events") if document.root else None
+    if not isinstance(listed, ListNode) or not listed.items:
+        return _with_first_item(document, "events", record_text(said, indent=_INDENT))
+    last, text = listed.items[-1], document.text
+    start, end = map(document.layout.offset_in_text, (last.start, last.end))
+    dash = text[text.rfind("\n", 0, start) + 1 : start].find("-")
+    if listed.is_flow or not isinstance(last, MappingNode) or dash < 0:
+        raise _layout_error(document, start, "events")
+    line_end = _line_end(text, end)
+    return f"{text[:line_end]}\n{record_text(said, indent=dash)}{text[line_end + 1 :]}"
 
 
-def _with_first_item(document: MapDocument, root: MappingNode, list_key: str, item: str) -> str:
+def _with_first_item(document: MapDocument, list_key: str, item: str) -> str:
     """Return the text with a first item below a key, in place of `[]`, null or nothing."""
-    text, listed = document.text, root.find_value(list_key)
+    text, listed = document.text, document.root and document.root.find_value(list_key)
+    if document.root is None and list_key == "waypoints":
+        text = _ended(text or _GREETING) + f"version: {FILE_VERSION}\n"
     if listed is None:
         return _ended(text) + f"{list_key}:\n{item}"
     start, end = map(document.layout.offset_in_text, (listed.start, listed.end))
@@ -118,6 +195,11 @@ def _with_first_item(document: MapDocument, root: MappingNode, list_key: str, it
         rest = f"  {rest.strip()}"
     head = text[:start].rstrip(" \t") + rest
     return f"{head}\n{item}{text[line_end + 1 :]}"
+
+
+def _free_id(document: MapDocument) -> str:
+    numbers = [int(each[1:]) for each in document.events if each[:1] == "E" and each[1:].isdigit()]
+    return f"E{max(numbers, default=0) + 1}"
 
 
 def _require_cut(document: MapDocument, start: int) -> None:
@@ -157,112 +239,3 @@ def _ended(text: str) -> str:
 def _line_end(text: str, offset: int) -> int:
     end = text.find("\n", offset)
     return len(text) if end < 0 else end
-
-
-_INDENT = 2
-
-
-def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
-    """Return the file with an event written: in its own record if its id is there already.
-
-    Returns:
-        The file, and the event as it reads there, with its id.
-
-    Raises:
-        SemanticMapError: The file is laid out in a way that cannot be written to.
-    """
-    named = event if event.id else replace(event, id=_free_id(document))
-    if named.id in document.events:
-        text = changed_events(document, {named.id: named})
-    else:
-        text = _with_new(document, named)
-    changed = _reparsed(document, text, list_key="events")
-    written = changed.events.get(named.id)
-    if written is None or event_data(written.event) != event_data(named):
-        raise _layout_error(document, 0, "events")
-    return changed, written.event
-
-
-def changed_events(document: MapDocument, events: dict[str, Event]) -> str:
-    """Return the file's text with some of its events changed."""
-    text = document.text
-    for record in sorted(document.events.values(), key=lambda each: -each.start):
-        new = events.get(record.event.id)
-        if new is None:
-            continue
-        # As an item of its own, indented as it was: comments and spelling stay.
-        line_start = text.rfind("\n", 0, record.start) + 1
-        before, block = text[line_start : record.start], text[record.start : record.end]
-        if before.strip(" -"):
-            raise _layout_error(document, record.start, "events")
-        item = " " * len(before) + block
-        edited = edited_record(item, old=event_data(record.event), new=event_data(new))
-        text = text[:line_start] + before + edited[len(before) :] + text[record.end :]
-    return text
-
-
-def _with_new(document: MapDocument, event: Event) -> str:
-    record = record_text(event_data(event), indent=_INDENT)
-    if document.root is None:
-        return _ended(document.text) + f"events:\n{record}"
-    listed = document.root.find_value("events")
-    if isinstance(listed, ListNode) and listed.items:
-        return _behind_last(document, listed, event)
-    return _with_first_item(document, document.root, "events", record)
-
-
-def _behind_last(document: MapDocument, listed: ListNode, event: Event) -> str:
-    last, text = listed.items[-1], document.text
-    start, end = map(document.layout.offset_in_text, (last.start, last.end))
-    line_start = text.rfind("\n", 0, start) + 1
-    dash = text[line_start:start].find("-")
-    if listed.is_flow or not isinstance(last, MappingNode) or dash < 0:
-        raise _layout_error(document, start, "events")
-    line_end = _line_end(text, end)
-    head = text[:line_end] + "\n"
-    return head + record_text(event_data(event), indent=dash) + text[line_end + 1 :]
-
-
-def _free_id(document: MapDocument) -> str:
-    numbers = [int(each[1:]) for each in document.events if each[:1] == "E" and each[1:].isdigit()]
-    return f"E{max(numbers, default=0) + 1}"
-
-
-def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
-    """Return the file with every waypoint and event moved.
-
-    Args:
-        motion: From the frame of its poses to the new one.
-        entries: Keys of the file itself that change with it, such as `map`.
-
-    Raises:
-        SemanticMapError: The file is laid out in a way that cannot be written to.
-    """
-    if document.records:
-        _require_cut(document, 0)
-    after = document
-    for key, value in entries.items():
-        after = with_entry(after, key, value)
-    events = {each.event.id: _moved_event(each.event, motion) for each in after.events.values()}
-    after = _reparsed(after, changed_events(after, events))
-    return _reparsed(after, _with_moved_records(after, motion))
-
-
-def _with_moved_records(document: MapDocument, motion: Pose) -> str:
-    pieces, end = [], 0
-    for record in sorted(document.records.values(), key=lambda each: each.start):
-        waypoint = record.reading.waypoint
-        new = waypoint.moved(motion)
-        block = document.text[record.start : record.end]
-        changed = edited_record(block, old=record_data(waypoint), new=record_data(new))
-        pieces += [document.text[end : record.start], changed]
-        end = record.end
-    return "".join([*pieces, document.text[end:]])
-
-
-def _moved_event(event: Event, motion: Pose) -> Event:
-    return replace(
-        event,
-        at=None if event.at is None else motion.transform(event.at),
-        outlines=tuple(tuple(map(motion.transform, outline)) for outline in event.outlines),
-    )

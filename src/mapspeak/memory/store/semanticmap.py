@@ -150,7 +150,7 @@ class SemanticMapStore:
             )
         )
         return WriteReceipt(
-            waypoint=after.records[key].reading.waypoint,
+            waypoint=after.records[key].waypoint,
             previous=_known(before, key),
             n_waypoints=len(after.records),
         )
@@ -162,7 +162,7 @@ class SemanticMapStore:
             SemanticMapError: There is none of that name, or as for `write`.
         """
         before, _ = self._change(lambda document: _removed(document, name))
-        return before.records[name_key(name)].reading.waypoint
+        return before.records[name_key(name)].waypoint
 
     def _read_document(self) -> MapDocument:
         return self._document_of(self._look())
@@ -257,7 +257,7 @@ def _say_map(map_id: str | None) -> str:
 
 def _known(document: MapDocument, key: str) -> Waypoint | None:
     record = document.records.get(key)
-    return None if record is None else record.reading.waypoint
+    return None if record is None else record.waypoint
 
 
 def _removed(document: MapDocument, name: str) -> MapDocument:
@@ -265,7 +265,7 @@ def _removed(document: MapDocument, name: str) -> MapDocument:
     if key in document.records:
         return without_waypoint(document, key)
     near = difflib.get_close_matches(key, document.records, n=3, cutoff=0.5)
-    names = ", ".join(quote_name(document.records[k].reading.waypoint.name) for k in near)
+    names = ", ".join(quote_name(document.records[k].waypoint.name) for k in near)
     raise SemanticMapError(
         f"No waypoint is called {quote_name(name)}.",
         hint=f"Near to it: {names}." if names else "List the waypoints to see their names.",
