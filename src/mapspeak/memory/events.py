@@ -71,11 +71,9 @@ class Event:
     """Something that is so for a while.
 
     Attributes:
-        id: "E3"; empty until it is written.
         place: Where, in words or ids of the time of writing: "corridor C1".
         outlines: Of the place at the time of writing, in the map frame; ids may change, and these
             do not.
-        begins: The first moment; None where it has always been so.
         until: The first moment after; None where nobody knows.
 
     Raises:
@@ -164,7 +162,6 @@ class Event:
         return f"; said by {quote(self.source)}"
 
     def _names_more_than_text(self) -> bool:
-        """Return True where a reader of the text does not read the place in it."""
         is_told = self.told_text.startswith('"') and self.place in self.text
         return bool(self.place) and not is_told
 

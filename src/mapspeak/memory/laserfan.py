@@ -156,11 +156,9 @@ class LaserRing:
         object.__setattr__(self, "ranges_m", ranges_m)
 
     def find_fan(self, stood: Pose, bearing_rad: float) -> LaserFan | None:
-        """Return what was met around a direction; None from elsewhere, or where nothing is known.
+        """Return what was met around a bearing from the heading of where one stood, left positive.
 
-        Args:
-            stood: Where one looked from, in the map frame.
-            bearing_rad: From the heading of that pose, left positive.
+        None from elsewhere than where the laser turned, or where nothing is known.
         """
         if self.pose.point.distance_to(stood.point) > SAME_STAND_M:
             return None
@@ -190,7 +188,6 @@ def build_ring(
 
     Args:
         angles_rad: By beam, from the heading, left positive.
-        ranges_m: Likewise; infinite where it met nothing, NaN where it is not known.
         reach_m: How far a beam that met nothing would have met something.
     """
     steps = np.asarray(angles_rad) / STEP_RAD

@@ -51,8 +51,6 @@ class Merge:
     """A waypoint written again, and what became of each thing.
 
     Attributes:
-        new: Landmarks that were not there before.
-        merged: Things that were, and are seen again.
         kept: Things that were, and are not named this time: all views of each, the latest first.
         gone: Things that were, and are said to be gone; the latest view of each.
     """
@@ -70,10 +68,6 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
     The same label near the same bearing is the same thing. Of its two looks from one spot the surer
     one counts, or the later of two equally sure ones; what that leaves open, the other fills in.
     Looks from different spots are both kept, `MOST_VIEWS` of them at most.
-
-    Args:
-        before: What was remembered under that name; None for a new place.
-        gone: Labels of things that are not there any more.
     """
     if before is None:
         return Merge(waypoint=now, new=now.landmarks, merged=(), kept=(), gone=())
@@ -155,7 +149,6 @@ def noted_at(landmark: Landmark, seen: Pose, pose: Pose) -> Landmark:
     Args:
         landmark: With its bearing from where it was seen.
         seen: From where that was.
-        pose: The waypoint's.
     """
     if not _is_measured(landmark) or seen.point.distance_to(pose.point) <= SAME_POSE_M:
         return seen_from(landmark, seen, pose)
@@ -175,7 +168,6 @@ def _group(waypoint: Waypoint, landmarks: Iterable[Landmark]) -> tuple[Views, ..
 
 
 def _dated_views(waypoint: Waypoint, views: Views) -> Views:
-    """Return views with all that they have from their waypoint: time, picture and pose."""
     return tuple(replace(waypoint.dated(each), pose=waypoint.pose_of(each)) for each in views)
 
 
@@ -209,7 +201,6 @@ def _is_further_view(waypoint: Waypoint, view: Landmark, others: Sequence[Landma
 
 
 def _pair(looks: Sequence[Landmark], things: Sequence[Views]) -> list[tuple[int, int]]:
-    """Pair what is the same thing, the nearest bearings first."""
     likenesses = sorted(
         (turn_rad, i, j)
         for i, look in enumerate(looks)
@@ -265,7 +256,6 @@ def _united(look: Landmark, views: Views) -> Views:
 
 
 def _best_apart(views: Sequence[Landmark]) -> Views:
-    """Return no more views than count: of the two nearest to each other the later one stays."""
     left = list(views)
     while len(left) > MOST_VIEWS:
         pairs = ((i, j) for j in range(len(left)) for i in range(j))

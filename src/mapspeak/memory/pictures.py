@@ -21,7 +21,6 @@ class PictureReading:
     """How far the robot's own sensors measured something in a picture to be.
 
     Attributes:
-        label: What they take it for.
         bearing_rad: From the heading the picture was taken along, left positive.
     """
 
@@ -39,11 +38,6 @@ class TakenPicture:
         id: How a reader speaks of it: P12.
         name: Its relative name, unlike that of any other picture of any run: P12-5d0c21f7.jpg.
         pose: Where the robot stood, in the map frame; the camera looks along its heading.
-        stamp_s: Robot time of the exposure.
-        horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
-        recorded_at: When it was taken, by the calendar; None where nobody knew.
-        readings: What the robot measured in it.
-        laser: What its laser met when it was taken; None without one.
         reported: Labels of all that the robot's detector reports in it; None where none read it.
     """
 
@@ -109,13 +103,7 @@ class PictureBook:
         return tuple(self._taken.values())
 
     def add(self, picture: TakenPicture, data: bytes, *, media_type: str) -> TakenPicture:
-        """Return a picture that was just taken with its id, and a name where no folder gave one.
-
-        Args:
-            picture: What is known of it.
-            data: As it was encoded.
-            media_type: Such as "image/jpeg".
-        """
+        """Return a picture that was just taken with its id, and a name where no folder gave one."""
         self._n_taken += 1
         picture_id = f"P{self._n_taken}"
         ending = media_type.partition("/")[2].replace("jpeg", "jpg")

@@ -40,7 +40,6 @@ def quote(text: str, *, most: int | None = None) -> str:
     line breaks and control signs become spaces. A backslash at the end escapes nothing.
 
     Args:
-        text: What was observed, or what somebody said.
         most: At most so many of its first characters; None for all.
     """
     line = clean_line(text).translate(_AS_APOSTROPHE)[:most]

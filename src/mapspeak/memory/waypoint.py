@@ -26,7 +26,6 @@ class Landmark:
     (`Waypoint.pose_of`, `Waypoint.dated`), and always its map and the room it was seen from.
 
     Attributes:
-        label: What it is, in a few words.
         bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
         range_m: Its distance from that pose.
         range_from: What measured that; None where the observer judged it.
@@ -67,13 +66,10 @@ class Waypoint:
     Attributes:
         name: How people call it; unique in its map, whatever its case (`name_key`).
         pose: From where it was observed, in the map frame.
-        safety_landmarks: Fixed safety equipment.
-        functional_landmarks: Fixed equipment and objects that tasks need.
         geometric_features: Persistent layout, such as "corner of two walls".
         stamp_s: Robot time of the observation.
         map_id: Which map the pose belongs to; None where the store decides.
         room_id: The room or corridor it was observed from, by the id that it had then.
-        picture: The picture that was taken there, by its relative name.
 
     Raises:
         SemanticMapError: The name is empty.
@@ -127,11 +123,7 @@ class Waypoint:
         return landmark.pose or self.pose
 
     def moved(self, motion: Pose) -> "Waypoint":
-        """Return it with all its poses in another frame; ids of rooms mean nothing there.
-
-        Args:
-            motion: From the frame of its poses to the new one.
-        """
+        """Return it with all poses moved to another frame, where ids of rooms mean nothing."""
         return replace(
             self,
             pose=motion @ self.pose,
@@ -163,7 +155,6 @@ class SemanticMap:
     """All remembered places of one map (paper eq. 9).
 
     Attributes:
-        map_id: Which map the poses belong to; None where nobody said.
         warnings: What its reader should know: another map's places, a file that is broken by now,
             a key that looks misspelt.
     """

@@ -48,7 +48,6 @@ def guess_transforms(old: MapSurfaces, new: MapSurfaces) -> Iterator[Pose]:
 
 
 def _find_turns(old: MapSurfaces, new: MapSurfaces) -> list[float]:
-    """Return turns by which the walls of both maps run in the same directions, best first."""
     before, after = _directions(old), _directions(new)
     spectrum = np.conj(np.fft.rfft(before)) * np.fft.rfft(after)
     likeness = np.fft.irfft(spectrum, N_BINS)
@@ -102,7 +101,6 @@ class _Field:
         self._fits, self._walls = map(np.fft.rfft2, self._rasters(new))
 
     def find_shifts(self, turn_rad: float) -> Iterator[Pose]:
-        """Return the shifts, for one turn, by which most walls fall on walls."""
         turn = Pose(0.0, 0.0, turn_rad)
         turned_centre = placed(self._old_centre[None], turn)[0]
         # Laid about the raster's corner, so that a shift is where the centre comes to lie.
@@ -236,8 +234,6 @@ class MapFit:
     """Where an old map lies on a new one.
 
     Attributes:
-        new_from_old: The transform from the old map's frame to the new one's.
-        quality: How well the maps agree when it is laid so.
         rival: How well they agree in the next best place; None where there is no other.
         off_m: How far the middle of the old map's walls moves.
     """

@@ -201,7 +201,6 @@ class RealignReceipt:
 
     Attributes:
         motion: From the old frame to the new one; None where nothing was moved.
-        certainty: How sure it is; None where nothing was moved.
         undo_path: The file as it was before.
     """
 
@@ -215,11 +214,7 @@ class RealignReceipt:
 
 
 class MapKeeper:
-    """Keeps the map that a store's records belong to, and compares it with the robot's.
-
-    Args:
-        episodes: What was observed on the way, with poses on the same map.
-    """
+    """Keeps the map that a store's records belong to, and compares it with the robot's."""
 
     def __init__(self, store: SemanticMapStore, episodes: EpisodeStore | None = None) -> None:
         self._store = store
@@ -283,11 +278,7 @@ class MapKeeper:
         return self._move(grid, comparison, comparison.fit)
 
     def finish_move(self) -> int:
-        """Move the observations where a crash has kept them from following their records.
-
-        Returns:
-            How many were moved.
-        """
+        """Move the observations that a crash has kept from it, and return how many these are."""
         return 0 if self._episodes is None else self._episodes.finish_move(at=self._name())
 
     def _move(self, grid: OccupancyGrid, comparison: MapComparison, fit: MapFit) -> RealignReceipt:

@@ -38,7 +38,6 @@ def check_pose(
 
 
 def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
-    """Return what is wrong with the cell at a point; None where it is free."""
     if max(abs(point.x), abs(point.y)) > FARTHEST_M:
         return FindingKind.OFF_MAP
     cell = grid.cell_at(point)
@@ -149,7 +148,6 @@ def check_things(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
 
 
 def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFinding]:
-    """Return things of different names in one place that nobody has seen beside each other."""
     for i, thing in enumerate(placed):
         for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= ONE_PLACE_M).tolist():
             other = placed[j]
@@ -326,7 +324,6 @@ def _sees_through(rooms: RoomMap, waypoint: Waypoint, thing: Thing, way: Sequenc
 
 
 def _off_line(start: Point, end: Point, point: Point) -> float:
-    """Return the metres from a point to the line between two others."""
     length = max(start.distance_to(end), 1e-9)
     turn = start.bearing_to(point) - start.bearing_to(end)
     along = min(max(math.cos(turn) * start.distance_to(point), 0.0), length)
@@ -347,8 +344,6 @@ def check_memory(
 
     Args:
         distances: From the robot, for whether it can get to a place; None leaves that out.
-        rooms: Of that map; None leaves them out.
-        map_id: The map that the robot is on; None takes the records for its.
     """
     findings: list[MemoryFinding] = []
     misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}

@@ -50,13 +50,10 @@ class MemoryFinding:
     """Something odd about what is remembered.
 
     Attributes:
-        waypoints: The names of the places concerned.
-        label: Of the one landmark concerned; None where it is the whole place.
         view: Of the one thing concerned, the view that points past it.
         ids: Of the maps: the record's and the robot's. Of the rooms: the one that a record names
             or a thing lies in, and the one that it is seen from.
         radius_m: Of the robot that cannot get there.
-        far_m: From one place to the other, or to the thing.
         told_m: How far away the landmark was told to be.
         open_m: How far the line to the landmark leads over free floor.
     """
@@ -97,11 +94,7 @@ class MemoryFinding:
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """How far something may be trusted.
-
-    Attributes:
-        thing: The thing, whose views speak for it; None of a place.
-    """
+    """How far something may be trusted."""
 
     ratio: float
     findings: tuple[MemoryFinding, ...]
@@ -124,7 +117,6 @@ def judge_trust(thing: Thing, findings: Iterable[MemoryFinding]) -> Trust:
 
 
 def _share(thing: Thing, finding: MemoryFinding) -> float:
-    """Return what share of a thing a finding concerns."""
     if finding.things:
         return float(thing in finding.things)
     views = [

@@ -30,10 +30,8 @@ class Observation:
 
     Attributes:
         recorded_at: When, by the calendar, with its time zone.
-        text: What was seen, in words; may be empty for a picture.
         picture: Name of the picture in the memory's folder; None without one, or after it was
             thinned.
-        stamp_s: Robot time of the observation.
         room_id: The room or corridor it was observed from, by the id that it had then.
         id: The same for the same content, so that writing twice is writing once; made from the
             content unless given.
@@ -164,12 +162,8 @@ class EpisodeMatch:
     """An observation that fits, and why.
 
     Attributes:
-        score_ratio: How well the words fit, up to 1; None where none were asked for.
-        distance_m: From where it was made to the place asked for; None where none was.
-        filters: All that it has passed.
         fitting: Which of its words fit; those asked for, where meanings were compared.
         label: The one asked for, as it stands there.
-        near: The place asked for.
         near_id: The observation that a nested query found there; None without one.
     """
 
@@ -188,9 +182,7 @@ class EpisodePage:
     """Observations that fit, in the order asked for.
 
     Attributes:
-        n_matches: How many fit in all.
         anchor: What the nested query found, which `near` stands for; None without one.
-        next_page: Asks for those that follow; None on the last page.
     """
 
     matches: tuple[EpisodeMatch, ...]

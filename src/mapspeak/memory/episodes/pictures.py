@@ -120,8 +120,6 @@ def choose_dropped(
 
     Args:
         pictures: All that are stored; one file may serve several observations.
-        now: The time that ages are counted from.
-        named: Names that records of the semantic map mention.
     """
     ordered = sorted(pictures, key=lambda picture: (picture.taken_at, picture.name), reverse=True)
     newest_of_group: dict[object, StoredPicture] = {}

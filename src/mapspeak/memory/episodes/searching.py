@@ -46,7 +46,6 @@ class TextScorer:
         """Return the best texts by their ids, each with its score above 0.
 
         Args:
-            rank: Who says how well a text fits; None compares words.
             among: A selection of text ids; empty for all texts.
         """
         if rank is None:
@@ -110,13 +109,7 @@ class _Where:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeSearch:
-    """Questions to one state of the database.
-
-    Attributes:
-        connection: Sees that state.
-        scorer: Knows the texts.
-        rank: Who says how well texts fit; None compares words.
-    """
+    """Questions to one state of the database."""
 
     connection: sqlite3.Connection
     scorer: TextScorer
@@ -162,7 +155,6 @@ class EpisodeSearch:
             where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(list(same)))
 
     def _score(self, words: str, where: _Where) -> dict[int, float]:
-        """Score the texts of the observations that pass the other filters."""
         is_filtered = len(where.conditions) > 2  # beside the state asked for
         passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
         among = passing if is_filtered else ""
@@ -177,7 +169,6 @@ class EpisodeSearch:
         where: _Where,
         scores: Mapping[int, float] | None,
     ) -> tuple[int, sqlite3.Cursor]:
-        """Return how many observations pass, and the rows of this page."""
         source, score, scored, values = "observations AS o", "NULL", "", where.values
         if scores is not None:
             source, score = "scored JOIN observations AS o USING (text_id)", "scored.score"

@@ -87,9 +87,6 @@ class EpisodeStore:
         Args:
             picture: JPEG or PNG; kept under a name that the observation gets.
 
-        Returns:
-            The observation as it is kept.
-
         Raises:
             SemanticMapError: It cannot be written, or the picture is of another kind.
         """
@@ -114,11 +111,7 @@ class EpisodeStore:
             return sum(_insert(connection, each, None) for each in observations)
 
     def take_over(self, other: "EpisodeStore") -> tuple[int, int]:
-        """Keep all observations of another store as they are, all or none, with their pictures.
-
-        Returns:
-            How many were new, and how many pictures came with them.
-        """
+        """Keep all of another store, or none; return how many observations and pictures are new."""
         if not other.database.exists():
             return 0, 0
         selection = f"SELECT {COLUMNS} FROM observations AS o ORDER BY o.n"  # noqa: S608 - our own columns
@@ -185,9 +178,6 @@ class EpisodeStore:
         """Move all poses if that was planned for the map that is kept now; forget other plans.
 
         Rooms of the old map are left away: their ids mean nothing on the new one.
-
-        Returns:
-            How many were moved.
         """
         if not self.has_plans():
             return 0
@@ -341,10 +331,6 @@ def bring_over(*memories: Path, to: Path) -> BroughtOver:
     """Copy the observations of some semantic map files, with their pictures, for another one.
 
     All of them or none; those of the memories stay as they are.
-
-    Args:
-        memories: Semantic map files of one map.
-        to: The file that they are for; it has no observations yet.
 
     Raises:
         SemanticMapError: It has some, or they cannot be read or written.

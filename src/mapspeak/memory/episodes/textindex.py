@@ -58,11 +58,7 @@ def add_text(connection: sqlite3.Connection, text: str) -> int:
 
 
 def score_words(connection: sqlite3.Connection, query: str) -> Scores:
-    """Return the share of a query that each text says, by its id; 0 where it is too little.
-
-    Args:
-        query: In words; rare ones count more.
-    """
+    """Return the share of a query that each text says, by its id; 0 where it is too little."""
     n_texts = int(connection.execute("SELECT MAX(text_id) FROM texts").fetchone()[0] or 0)
     scores = np.zeros(n_texts + 1)
     total = 0.0
@@ -135,11 +131,7 @@ _BATCH = 512
 
 
 class VectorRank:
-    """A `Rank` that embeds each text once, whatever process asks.
-
-    Args:
-        database: Where vectors are kept, by embedder and text.
-    """
+    """A `Rank` that embeds each text once, whatever process asks."""
 
     def __init__(self, database: EpisodeDatabase, embedder: Embedder) -> None:
         self._database = database

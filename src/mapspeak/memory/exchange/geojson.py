@@ -72,9 +72,6 @@ def place_of(waypoint: Waypoint) -> Point:
 def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
     """Return the memory as GeoJSON.
 
-    Args:
-        anchor: Where on Earth the map lies; without one, coordinates are metres in the map frame.
-
     Raises:
         MapError: A place is too far from the anchor.
     """
@@ -157,7 +154,6 @@ def _plain(key: str, value: object) -> object:
 
 
 def _fault(error: ValidationError, what: str) -> SemanticMapError:
-    """Return the first fault that was found, with its place."""
     first = error.errors()[0]
     place = ".".join(map(str, first["loc"])) or "the whole of it"
     return SemanticMapError(

@@ -26,7 +26,6 @@ class Union:
 
     Attributes:
         places: All of them: the first memory's in its order, then what only the second has.
-        changed: Those that the first memory does not have, or has otherwise.
         findings: What became of each name that was in both and not the same.
     """
 
@@ -94,7 +93,6 @@ def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
 
 
 def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
-    """Return the newer place, with what only the older one says."""
     features = {name_key(text): text for text in newer.geometric_features}
     for text in older.geometric_features:
         features.setdefault(name_key(text), text)

@@ -59,13 +59,7 @@ KIND_WEIGHTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchEvidence:
-    """One word of the phrase, and where the record says it.
-
-    Attributes:
-        query_word: As it stands in the phrase.
-        found_word: As it stands in the record.
-        text: The name, label, purpose, feature, note or description it stands in.
-    """
+    """One word of the phrase, and where the record says it."""
 
     query_word: str
     found_word: str
@@ -92,12 +86,8 @@ class Entry:
 
     Attributes:
         id: What its owner knows it by; no two entries share it.
-        name: The place's name or the thing's label.
-        description: The same in whole sentences.
-        features: Persistent layout, such as "corner of two walls".
         place: For a thing, the name of the place where it is.
         surroundings: What is said of that place.
-        other_names: What else it is called.
     """
 
     id: str
@@ -220,9 +210,7 @@ class EntryCandidate:
 
     Attributes:
         score_ratio: How alike it and the request are; 1 for its very name.
-        basis: What the score compares.
         field: Which part of the record is most like the request.
-        text: What stands there.
         evidence: The words of the request that the record says.
         said_ratio: How much of the request the record says word for word; rare words and names
             count more, parts of words nothing.
@@ -245,7 +233,6 @@ class Answer:
         understood: The same with misspelt words put right.
         verdict: How far to trust the first candidate. Where nothing is remembered the candidates
             are only the nearest things, and probably none of them is meant.
-        candidates: The likeliest first.
         n_meant: How many, of all that is remembered, fit as well as the first.
         is_sure: Whether what is meant is called as the first is, however many of it there are.
         limits: What the search could not do, in words; None where nothing was missing.

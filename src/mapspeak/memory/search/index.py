@@ -118,7 +118,6 @@ class EntryIndex:
 
         Args:
             query: What people say: a name, a thing, what it is for, what is the matter.
-            among: The ids to choose from; all where None.
         """
         words = self._words.ask(query)
         understood = self._understand(query, words)
@@ -173,7 +172,6 @@ class EntryIndex:
         return _Asked(understood, words, common, ratios, said_ratios, part_ratios, missing)
 
     def _order(self, ratios: Floats, among: Container[str] | None) -> list[int]:
-        """Return the numbers of the entries that say anything of it, the likeliest first."""
         likely = np.flatnonzero(ratios > 0)
         if among is not None:
             likely = likely[[self._entries[number].id in among for number in likely]]
@@ -247,7 +245,6 @@ class EntryIndex:
         )
 
     def _explain(self, asked: _Asked, number: int) -> tuple[MatchEvidence, ...]:
-        """Return which words the record says; where it says none, what is commonly known does."""
         said = self._words.explain(asked.words, number)
         return said or self._common_words.explain(asked.common, number)
 

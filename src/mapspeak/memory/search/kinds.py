@@ -142,11 +142,7 @@ Floats = NDArray[np.float64]
 
 
 class KindIndex:
-    """The kinds of some entries, and the names of all other kinds.
-
-    Args:
-        vectors: What compares meanings; None where there is no model.
-    """
+    """The kinds of some entries, and the names of all other kinds."""
 
     def __init__(
         self, entries: Sequence[Entry], said: Sequence[Texts], vectors: TextVectors | None
@@ -237,9 +233,7 @@ def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[s
     "mouse trap" no mouse.
 
     Args:
-        request: What people say.
         names: What the thing is called. It may say more than the request, or less.
-        other_names: What such things are also called.
     """
     words = _without_opening(request)
     if not words_of("denied").isdisjoint(word for _, word in split_words(words)):
@@ -265,7 +259,6 @@ def says_purpose(request: str, purpose: str | None) -> bool:
 
 
 def _without_opening(request: str) -> str:
-    """Return a request from the first word on that may say what is meant."""
     words = [shown for shown, _ in split_words(request)]
     first = next((i for i, word in enumerate(words) if word.lower() not in words_of("opening")), 0)
     return " ".join(words[first:])

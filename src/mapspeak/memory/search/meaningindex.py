@@ -141,10 +141,6 @@ class MeaningIndex:
     The vector of "ladder: for reaching the top" is the sum of those of its two halves, which count
     the same. It finds as much as that of the whole would, and each text need be embedded only once,
     however many things are called a ladder or stand in one place.
-
-    Args:
-        common: What is commonly known of each.
-        vectors: What compares meanings.
     """
 
     def __init__(

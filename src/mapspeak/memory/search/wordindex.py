@@ -151,7 +151,6 @@ class Vocabulary:
         return found or dict.fromkeys(self._misspelt(word), MatchKind.MISSPELT)
 
     def _parts(self, asked: str) -> list[str]:
-        """Return the words that begin or end with this stem, or that it begins or ends with."""
         n = len(asked)
         if n < MIN_LETTERS:
             return []
@@ -169,7 +168,6 @@ class Vocabulary:
 
 
 def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
-    """Return the words that begin so, of words in order."""
     behind = (words[number] for number in range(bisect_left(words, start), len(words)))
     return takewhile(lambda word: word.startswith(start), behind)
 
@@ -188,7 +186,6 @@ class AskedWords:
 
     Attributes:
         spellings: The words of the records that count as this one, the likeliest misspelt first.
-        weight: The rarer in the records, the more.
         is_doubtful: Whether neither records nor language know the word as it is spelt.
     """
 
@@ -205,11 +202,7 @@ class AskedWords:
 
 
 class WordIndex:
-    """The words of records, each with the numbers of the records that say it.
-
-    Args:
-        is_known: Whether it is a word of the language, and so not a misspelt one.
-    """
+    """The words of records, each with the numbers of the records that say it."""
 
     def __init__(
         self, records: Sequence[Texts], *, is_known: Callable[[str], bool] = lambda _: False

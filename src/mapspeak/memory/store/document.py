@@ -44,7 +44,6 @@ class Record:
     """What a record says and where it stands in the text.
 
     Attributes:
-        key: The `name_key` of its name.
         misspelt: Keys that look like known ones, each with the known one.
     """
 
@@ -69,15 +68,11 @@ class MapDocument:
     """A semantic map file that was read without a fault.
 
     Attributes:
-        source: How messages call the file.
         text: All of it, with lines that end in a line feed.
         line_end: What most of its lines end in, and all that are written.
         root: Its top mapping without the records; None where the file says nothing.
-        layout: Where the records stand in the text.
         records: By `name_key`, in the order of the file.
         events: By their ids, likewise.
-        map_id: The map that the file says it belongs to, if any.
-        warnings: Keys that look misspelt.
     """
 
     source: str
@@ -118,7 +113,6 @@ def parse_document(
     """Read a semantic map file.
 
     Args:
-        source: How messages call the file.
         previous: What was read from it before; spares reading unchanged records again.
 
     Raises:
@@ -234,7 +228,6 @@ def _records(
     map_id: str | None,
     previous: MapDocument | None,
 ) -> Iterator[Record]:
-    """Read the records, but for those whose text was read before."""
     known = {}
     if previous is not None and previous.map_id == map_id:
         known = {previous.text[each.start : each.end]: each for each in previous.records.values()}

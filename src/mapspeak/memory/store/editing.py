@@ -207,7 +207,6 @@ class _Editor:
         return _Edit(dashes[0], spans[-1][1], value)
 
     def _continued(self, node: Node, span: tuple[int, int], old: Data, new: Data) -> str:
-        """Return an old item's text with what is new about it."""
         edits: Iterable[_Edit] = ()
         if isinstance(node, MappingNode):
             edits = self.mapping_edits(node, _as_mapping(old), _as_mapping(new))

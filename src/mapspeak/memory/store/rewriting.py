@@ -109,10 +109,9 @@ def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]
 
 
 def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
-    """Return the file with every waypoint and event moved.
+    """Return the file with every waypoint and event moved from its frame to a new one.
 
     Args:
-        motion: From the frame of its poses to the new one.
         entries: Keys of the file itself that change with it, such as `map`.
 
     Raises:

@@ -250,7 +250,6 @@ def fault_in(node: Node, error: ValidationError) -> TextError:
 
 
 def _locate(node: Node, location: tuple[int | str, ...]) -> tuple[Node, str]:
-    """Return the innermost node on the way to a fault, and the whole way in words."""
     path = "The record"
     for step in location:
         said = tell_name(str(step))

@@ -30,7 +30,6 @@ class WriteReceipt:
 
     Attributes:
         waypoint: As it is remembered from now on: millimetres, hundredths of a degree.
-        previous: What was remembered under that name before; None where it is new.
     """
 
     waypoint: Waypoint
@@ -40,12 +39,7 @@ class WriteReceipt:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Seen:
-    """The file as it was read last.
-
-    Attributes:
-        document: The last one without a fault.
-        fault: What is wrong with the present one.
-    """
+    """The file as it was read last."""
 
     fingerprint: Fingerprint | None
     document: MapDocument | None
@@ -175,7 +169,6 @@ class SemanticMapStore:
     def _change(
         self, change: Callable[[MapDocument], MapDocument]
     ) -> tuple[MapDocument, MapDocument]:
-        """Replace the file of this map by a changed one and return both."""
 
         def change_of_this_map(document: MapDocument) -> MapDocument:
             self._require_same_map(document.map_id, f"The file {self.path}")

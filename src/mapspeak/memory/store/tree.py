@@ -35,7 +35,6 @@ class TextError(SemanticMapError):
     """The text is wrong at one place.
 
     Attributes:
-        offset: Of the fault, in characters.
         other_offset: Of the place it clashes with, if any.
     """
 
@@ -61,7 +60,6 @@ class ScalarNode:
     Attributes:
         is_plain: It stands without quotes.
         start: Offset of its first character, the quote included.
-        end: Offset behind its last.
     """
 
     text: str

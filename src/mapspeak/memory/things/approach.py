@@ -44,8 +44,6 @@ def find_approach(
     Of all places on that side the best one faces most of where the thing may be.
 
     Args:
-        distances: From the robot, on that map.
-        seen_from: The places of those who saw it.
         fronts: What `find_fronts` gives for these, where it is at hand.
         whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.
 

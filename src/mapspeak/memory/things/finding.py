@@ -235,7 +235,6 @@ _SAME_PLACE_M = 0.3
 
 
 def _describe_one(located: Located, conflicting: Iterable[WeighedView]) -> Thing:
-    """Return the thing that a group of views has seen, and others say is elsewhere."""
     placement = located.placement
     ordered = sorted(located.group, key=lambda each: name_key(each.waypoint.name))
     labels = _by_votes(each.landmark.label for each in ordered)
@@ -286,7 +285,6 @@ def _confidence(apart: Iterable[tuple[WeighedView, float]]) -> float:
 
 
 def _from_different_places(located: Located) -> Iterator[tuple[WeighedView, float]]:
-    """Return the first view from each place, with its agreement."""
     places = list[Point]()
     for each, agreement in zip(located.group, located.agreements, strict=True):
         here = each.waypoint.pose.point

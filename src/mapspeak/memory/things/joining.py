@@ -40,7 +40,6 @@ class _Ballot:
     Attributes:
         places: Lattice cells that any view speaks of, rising.
         voters: For each vote, the index of its view.
-        ratios: How much likelier the view makes the place.
         starts: Where the votes of each place begin; one more at the end.
     """
 
@@ -65,7 +64,6 @@ class _Ballot:
         )
 
     def votes_at(self, indices: IntArray) -> IntArray:
-        """Return the numbers of the votes for some places."""
         sizes = self.starts[indices + 1] - self.starts[indices]
         first = np.repeat(self.starts[indices] - np.cumsum(sizes) + sizes, sizes)
         return first + np.arange(int(sizes.sum()))
@@ -76,7 +74,6 @@ class _Ballot:
         return best if np.isfinite(self._votes[best]) else None
 
     def take_out(self, voter: int) -> None:
-        """Take all votes of one view out."""
         mine = self._by_voter[self._ends[voter] : self._ends[voter + 1]]
         at = self._at[mine]
         self._votes[at] -= self._weights[mine]
@@ -143,7 +140,6 @@ def _take_peaks(sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ball
 
 
 def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
-    """Return the places at and beside one, as indices."""
     n_cols = sight.rows.shape[1]
     steps = np.array([-1, 0, 1])
     cells = (ballot.places[index] + n_cols * steps[:, None] + steps).ravel()

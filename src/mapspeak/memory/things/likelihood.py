@@ -75,7 +75,6 @@ class Outlook:
     Attributes:
         cells: Flat indices into the lattice, rising.
         angles: Where they are, in the frame of the grid.
-        ranges_m: How far they are.
         sight: How likely one sees that far: 1, or less behind what one may see over.
         near_m: To the first obstacle, by ray.
     """
@@ -93,7 +92,6 @@ class ViewLikelihood:
 
     Attributes:
         cells: Flat indices into the lattice, rising.
-        ratios: How much more likely.
         update: What the laser knew better than the map, wherever the thing is; None for nothing.
     """
 
@@ -107,7 +105,6 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
 
     Args:
         near_m: How far one sees to the first obstacle, by ray.
-        far_m: How far to the first wall, by ray.
     """
     res_m, factor = sight.grid.resolution_m, sight.factor
     row, col = sight.grid.fractional_cells_at(np.array([[pose.x, pose.y]]))[0].tolist()
@@ -180,7 +177,6 @@ class WeighedView:
 
     Attributes:
         waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
-        wrong_ratio: How likely it is wrong as a whole.
         likelihood: Where it may be; None where nothing says.
         spot: Where its direction and range together say that it is; None without both.
     """
@@ -199,7 +195,6 @@ class Surroundings:
 
     Attributes:
         near_m: To the first obstacle, by ray of the grid's frame.
-        far_m: To the first wall.
         sightings: Of all its landmarks; none where its standpoints have them.
     """
 

@@ -58,7 +58,6 @@ class Placement:
     whereabouts: FloatArray
 
     def __post_init__(self) -> None:
-        """Lock the points."""
         points = np.array(self.whereabouts)
         points.setflags(write=False)
         object.__setattr__(self, "whereabouts", points)
@@ -128,7 +127,6 @@ def place(sight: SightMap, posterior: Posterior, seen_from: Sequence[Point]) -> 
     """Return the middle of the densest part of the weight, and how far 90 % of it reaches.
 
     Args:
-        posterior: Where the thing may be, by the cells that the robot has met of it.
         seen_from: The places of those who saw it: its middle lies behind what they met.
     """
     rows, cols = sight.rows.ravel()[posterior.cells], sight.cols.ravel()[posterior.cells]

@@ -72,7 +72,6 @@ class SightMap:
         """Return how far one sees, in metres, from each place along its angle.
 
         Args:
-            off: `obstacle_off` or `wall_off`.
             places: Fractional cells, shape (n, 2).
             angles: In the frame of the grid, shape (n,).
             begin_m: Nearer obstacles do not count; one number, or one for each ray.
@@ -192,7 +191,6 @@ def correct_by_laser(
         near_m: How far one sees on the map to the first obstacle, by ray.
         cells: Lattice cells in sight around the direction that was told, rising.
         angles: Where they are, in the frame of the grid.
-        ranges_m: How far they are.
         seen: How likely one sees each by the map alone.
     """
     ahead = pose.yaw_rad - sight.grid.origin.yaw_rad
@@ -220,12 +218,7 @@ def correct_by_laser(
 def find_log_priors(
     sight: SightMap, cells: IntArray, updates: Iterable[LaserUpdate | None]
 ) -> FloatArray:
-    """Return how likely a thing is in cells before any view, by the map and what corrects it.
-
-    Args:
-        cells: Of the lattice, rising.
-        updates: Of all views of a thing.
-    """
+    """Return how likely a thing is in rising lattice cells before any view, as a logarithm."""
     logs = sight.log_prior.ravel()[cells]
     told = [each for each in updates if each is not None and each.cells.size]
     if not told:

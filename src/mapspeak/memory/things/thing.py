@@ -105,7 +105,6 @@ class View:
     """One landmark, as it was seen from one pose, and what it says of a thing.
 
     Attributes:
-        waypoint: The name of the place it was seen from.
         place: Where it was seen from: that waypoint's place, or the view's own.
         far_m: From there to the thing; None where the view says no direction or the thing has no
             position.
@@ -124,12 +123,9 @@ class Thing:
     """One thing in the building, out of everything that was seen of it. It has no id.
 
     Attributes:
-        label: What most views call it.
-        category: What most views file it under.
         position: Where it is; None where no view says a direction.
         uncertainty_m: The radius around the position that holds it with 90 %; None without one.
         supporting: Views of it, by waypoint; one waypoint may have several, each from its pose.
-        conflicting: Views that say otherwise.
         confidence_ratio: That there is such a thing there, by its views alone.
         n_agreeing: From how many different places it was seen by views that agree on where it is.
         whereabouts: Points of the map frame, shape (n, 2), locked: its surface is as likely at any
