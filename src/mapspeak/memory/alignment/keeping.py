@@ -8,6 +8,8 @@ there before.
 import math
 import os
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -26,6 +28,7 @@ from mapspeak.memory.alignment.fitting import (
 from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, judge
 from mapspeak.memory.episodes.store import EpisodeStore
 from mapspeak.memory.store.document import MapDocument
+from mapspeak.memory.store.durable import write_synced
 from mapspeak.memory.store.rewriting import moved
 from mapspeak.memory.store.semanticmap import SemanticMapStore
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
@@ -66,21 +69,17 @@ class SnapshotFolder:
         """
         grid = _in_three_greys(grid)
         stem = f"{Path(name).stem}-{zlib.crc32(grid.cells.tobytes()):08x}"
-        try:
+        with self._explained():
             self.path.mkdir(exist_ok=True, parents=True)
             new = self.path / f"{stem}.yaml"
             picture = write_map(grid, new)
-            _sync(picture)
-            _sync(new)
+            for path in (picture, new):
+                with path.open("rb+") as file:
+                    os.fsync(file.fileno())
             new.replace(self.path / name)
-            self._forget_pictures_of(name, but=picture)
-        except MapError as error:
-            raise SemanticMapError(error.message, hint=error.hint) from error
-        except OSError as error:
-            raise SemanticMapError(
-                f"The map cannot be kept in {self.path}: {error.strerror or error}.",
-                hint="Check that the folder may be written to and has room.",
-            ) from error
+            for other in self.path.glob(f"{Path(name).stem}-????????.pgm"):
+                if other != picture:
+                    other.unlink(missing_ok=True)
 
     def free_name(self) -> str:
         """Return a name for another map that none has yet: map-2.yaml, map-3.yaml, ..."""
@@ -92,20 +91,21 @@ class SnapshotFolder:
     def note(self, name: str, content: bytes) -> Path:
         """Write any other file into the folder; it is on the disk when this returns."""
         path = self.path / name
-        try:
-            path.write_bytes(content)
-            _sync(path)
-        except OSError as error:
-            raise SemanticMapError(
-                f"{path} cannot be written: {error.strerror or error}.",
-                hint="Check that the folder may be written to and has room.",
-            ) from error
+        with self._explained():
+            write_synced(path, content)
         return path
 
-    def _forget_pictures_of(self, name: str, *, but: Path) -> None:
-        for picture in self.path.glob(f"{Path(name).stem}-????????.pgm"):
-            if picture != but:
-                picture.unlink(missing_ok=True)
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except MapError as error:
+            raise SemanticMapError(error.message, hint=error.hint) from error
+        except OSError as error:
+            raise SemanticMapError(
+                f"The map cannot be kept in {self.path}: {error.strerror or error}.",
+                hint="Check that the folder may be written to and has room.",
+            ) from error
 
 
 def _in_three_greys(grid: OccupancyGrid) -> OccupancyGrid:
@@ -114,11 +114,6 @@ def _in_three_greys(grid: OccupancyGrid) -> OccupancyGrid:
     return OccupancyGrid(
         cells=cells, resolution_m=grid.resolution_m, origin=grid.origin, stamp_s=grid.stamp_s
     )
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
 
 
 NO_MOTION = Pose(0.0, 0.0, 0.0)
@@ -161,7 +156,12 @@ def compare_maps(old: OccupancyGrid, new: OccupancyGrid) -> MapComparison:
     as_it_lies = judge(before, after, NO_MOTION)
     fit, relation = None, MapRelation.SAME
     shortest_m = min(before.length_m, after.length_m)
-    if not _is_good(as_it_lies):
+    is_good = (
+        as_it_lies.agreement_ratio >= LEAST_STILL_AGREEMENT
+        and as_it_lies.overlap_ratio >= LEAST_OVERLAP
+        and as_it_lies.shared_m >= LEAST_STILL_M
+    )
+    if not is_good:
         relation = MapRelation.UNKNOWN
         if shortest_m >= LEAST_SHARED_M:
             fit = find_fit(before, after)
@@ -180,14 +180,6 @@ def _relation_of(fit: MapFit | None) -> MapRelation:
         and fit.quality.overlap_ratio >= LEAST_OVERLAP
     )
     return MapRelation.UNKNOWN if is_possible else MapRelation.OTHER
-
-
-def _is_good(quality: MapAgreement) -> bool:
-    return (
-        quality.agreement_ratio >= LEAST_STILL_AGREEMENT
-        and quality.overlap_ratio >= LEAST_OVERLAP
-        and quality.shared_m >= LEAST_STILL_M
-    )
 
 
 GROWN_RATIO = 0.1

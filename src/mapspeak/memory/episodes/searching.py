@@ -27,58 +27,6 @@ MOST_TEXTS = 2000
 """How many different texts, the best ones, one query looks at."""
 
 
-class TextScorer:
-    """Scores texts, and keeps those that it has read: they never change."""
-
-    def __init__(self) -> None:
-        self._texts: tuple[str, ...] = ()
-        """The text with the id i is [i - 1]."""
-
-    def score(
-        self,
-        connection: sqlite3.Connection,
-        words: str,
-        rank: Rank | None,
-        *,
-        among: str,
-        values: list[object],
-    ) -> dict[int, float]:
-        """Return the best texts by their ids, each with its score above 0.
-
-        Args:
-            among: A selection of text ids; empty for all texts.
-        """
-        if rank is None:
-            scores = score_words(connection, words)
-            if among:
-                passing = np.zeros(len(scores))
-                passing[read_ids(connection, among, values)] = 1.0
-                scores *= passing
-            return _best(scores)
-        texts = self._texts
-        selection = "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id"
-        texts += tuple(row[0] for row in connection.execute(selection, [len(texts)]))
-        self._texts = texts
-        ids = np.arange(1, len(texts) + 1)
-        if among:
-            ids = np.unique(read_ids(connection, among, values))
-        scores = np.zeros(len(texts) + 1)
-        scores[ids] = rank(words, [texts[i - 1] for i in ids.tolist()])
-        return _best(scores)
-
-
-def _best(scores: Scores) -> dict[int, float]:
-    """Return the highest scores above 0 by their place; of equal ones the later, newer text."""
-    found = np.flatnonzero(scores > 0)
-    if len(found) > MOST_TEXTS:
-        # What is not among them for sure need not be sorted.
-        least = np.partition(scores[found], -MOST_TEXTS)[-MOST_TEXTS]
-        found = found[scores[found] >= least]
-    order = np.lexsort((-found, -scores[found]))[:MOST_TEXTS]
-    chosen = found[order]
-    return dict(zip(chosen.tolist(), scores[chosen].tolist(), strict=True))
-
-
 COLUMNS = (
     "o.id, o.recorded_us, o.offset_s, o.stamp_s, o.map_id, o.x, o.y, o.yaw_rad, o.room_id, "
     "o.kind, o.text, o.labels, o.picture"
@@ -107,118 +55,155 @@ class _Where:
         return " AND ".join(self.conditions)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeSearch:
-    """Questions to one state of the database."""
+    """Questions to the database; texts that were read are kept, for they never change."""
 
-    connection: sqlite3.Connection
-    scorer: TextScorer
-    rank: Rank | None
+    def __init__(self) -> None:
+        self._texts: tuple[str, ...] = ()
+        """The text with the id i is [i - 1]."""
 
-    def find(self, query: EpisodeQuery) -> EpisodePage:
-        """Return one page of the observations that pass every filter."""
+    def find(
+        self, connection: sqlite3.Connection, query: EpisodeQuery, rank: Rank | None
+    ) -> EpisodePage:
+        """Return one page of the observations that pass every filter.
+
+        Args:
+            connection: Sees one state of the database.
+            rank: Who says how well texts fit; None compares words.
+        """
         if query.as_of is None:
-            newest = self.connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
+            newest = connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
             query = replace(query, as_of=newest or 0)
         near, anchor = query.near, None
         if isinstance(near, EpisodeQuery):
-            anchor = next(iter(self.find(replace(near, limit=1)).matches), None)
+            anchor = next(iter(self.find(connection, replace(near, limit=1), rank).matches), None)
             if anchor is None:
                 return EpisodePage(matches=(), n_matches=0)
             where = _filters(query, anchor.observation.pose.point)
-            self._leave_out(where, near, anchor, is_on_any_map=query.map_id is None)
+            if query.map_id is None:
+                # The metres of other maps are others.
+                where.add("o.map_id IS ?", anchor.observation.map_id)
+            _leave_out(connection, where, near, anchor)
             near = anchor.observation.pose.point
         else:
             where = _filters(query, near)
-        scores = None if query.words is None else self._score(query.words, where)
-        n_matches, rows = self._select(query, near, where, scores)
+        scores = None
+        if query.words is not None:
+            scores = self._score(connection, query.words, where, rank)
+        n_matches, rows = _select(connection, query, near, where, scores)
         behind = query.offset + query.limit
         return EpisodePage(
-            matches=tuple(self._match(row, query, near, anchor) for row in rows),
+            matches=tuple(_match(row, query, near, anchor, rank) for row in rows),
             n_matches=n_matches,
             anchor=anchor,
             next_page=replace(query, offset=behind) if behind < n_matches else None,
         )
 
-    def _leave_out(
-        self, where: _Where, nested: EpisodeQuery, anchor: EpisodeMatch, *, is_on_any_map: bool
-    ) -> None:
-        """Leave out what a nested query was about, and other maps, whose metres are others."""
-        where.add("o.id != ?", anchor.observation.id)
-        if is_on_any_map:
-            where.add("o.map_id IS ?", anchor.observation.map_id)
-        if nested.label is not None:
-            where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
-        if nested.words is not None:
-            # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
-            same = self.scorer.score(self.connection, nested.words, None, among="", values=[])
-            where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(list(same)))
-
-    def _score(self, words: str, where: _Where) -> dict[int, float]:
+    def _score(
+        self, connection: sqlite3.Connection, words: str, where: _Where, rank: Rank | None
+    ) -> dict[int, float]:
+        """Return the best texts of what passes the other filters: their ids with scores above 0."""
         is_filtered = len(where.conditions) > 2  # beside the state asked for
         passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
-        among = passing if is_filtered else ""
-        return self.scorer.score(
-            self.connection, words, self.rank, among=among, values=where.values
-        )
+        among = np.unique(read_ids(connection, passing, where.values)) if is_filtered else None
+        if rank is None:
+            scores = score_words(connection, words)
+            if among is not None:
+                scores[np.isin(np.arange(len(scores)), among, invert=True)] = 0.0
+            return _best(scores)
+        selection = "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id"
+        texts = self._texts
+        texts += tuple(row[0] for row in connection.execute(selection, [len(texts)]))
+        self._texts = texts
+        ids = np.arange(1, len(texts) + 1) if among is None else among
+        scores = np.zeros(len(texts) + 1)
+        scores[ids] = rank(words, [texts[i - 1] for i in ids.tolist()])
+        return _best(scores)
 
-    def _select(
-        self,
-        query: EpisodeQuery,
-        near: Point | None,
-        where: _Where,
-        scores: Mapping[int, float] | None,
-    ) -> tuple[int, sqlite3.Cursor]:
-        source, score, scored, values = "observations AS o", "NULL", "", where.values
-        if scores is not None:
-            source, score = "scored JOIN observations AS o USING (text_id)", "scored.score"
-            scored = (
-                "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
-                "json_extract(value, '$[1]') AS score FROM json_each(?))"
-            )
-            values = [json.dumps(list(scores.items())), *where.values]
-        squared = "NULL" if near is None else _squared_m2(near)
-        counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
-        n_matches = self.connection.execute(counted, values).fetchone()[0]
-        rows = self.connection.execute(
-            f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
-            f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
-            "LIMIT ? OFFSET ?",
-            [*values, query.limit, query.offset],
-        )
-        return n_matches, rows
 
-    def _match(
-        self,
-        row: sqlite3.Row,
-        query: EpisodeQuery,
-        near: Point | None,
-        anchor: EpisodeMatch | None,
-    ) -> EpisodeMatch:
-        observation = observation_from(row)
-        given = {
-            EpisodeFilter.WORDS if self.rank is None else EpisodeFilter.MEANING: query.words,
-            EpisodeFilter.PLACE: near,
-            EpisodeFilter.ROOM: query.room_id,
-            EpisodeFilter.LABEL: query.label,
-            EpisodeFilter.TIME: query.since or query.until,
-            EpisodeFilter.KIND: query.kind,
-            EpisodeFilter.MAP: query.map_id,
-        }
-        fitting = [] if query.words is None else [query.words]
-        if query.words is not None and self.rank is None:
-            fitting = shared_words(query.words, observation.searched_text)
-        key = None if query.label is None else name_key(query.label)
-        return EpisodeMatch(
-            observation=observation,
-            score_ratio=row["score"],
-            distance_m=None if near is None else observation.pose.point.distance_to(near),
-            filters=tuple(each for each, value in given.items() if value is not None),
-            fitting=tuple(fitting),
-            label=next((each for each in observation.labels if name_key(each) == key), None),
-            near=near,
-            near_id=None if anchor is None else anchor.observation.id,
+def _leave_out(
+    connection: sqlite3.Connection, where: _Where, nested: EpisodeQuery, anchor: EpisodeMatch
+) -> None:
+    """Leave out what a nested query was about."""
+    where.add("o.id != ?", anchor.observation.id)
+    if nested.label is not None:
+        where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
+    if nested.words is not None:
+        # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
+        same = list(_best(score_words(connection, nested.words)))
+        where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(same))
+
+
+def _best(scores: Scores) -> dict[int, float]:
+    """Return the highest scores above 0 by their place; of equal ones the later, newer text."""
+    found = np.flatnonzero(scores > 0)
+    if len(found) > MOST_TEXTS:
+        # What is not among them for sure need not be sorted.
+        least = np.partition(scores[found], -MOST_TEXTS)[-MOST_TEXTS]
+        found = found[scores[found] >= least]
+    order = np.lexsort((-found, -scores[found]))[:MOST_TEXTS]
+    chosen = found[order]
+    return dict(zip(chosen.tolist(), scores[chosen].tolist(), strict=True))
+
+
+def _select(
+    connection: sqlite3.Connection,
+    query: EpisodeQuery,
+    near: Point | None,
+    where: _Where,
+    scores: Mapping[int, float] | None,
+) -> tuple[int, sqlite3.Cursor]:
+    source, score, scored, values = "observations AS o", "NULL", "", where.values
+    if scores is not None:
+        source, score = "scored JOIN observations AS o USING (text_id)", "scored.score"
+        scored = (
+            "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
+            "json_extract(value, '$[1]') AS score FROM json_each(?))"
         )
+        values = [json.dumps(list(scores.items())), *where.values]
+    squared = "NULL" if near is None else _squared_m2(near)
+    counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
+    n_matches = connection.execute(counted, values).fetchone()[0]
+    rows = connection.execute(
+        f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
+        f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
+        "LIMIT ? OFFSET ?",
+        [*values, query.limit, query.offset],
+    )
+    return n_matches, rows
+
+
+def _match(
+    row: sqlite3.Row,
+    query: EpisodeQuery,
+    near: Point | None,
+    anchor: EpisodeMatch | None,
+    rank: Rank | None,
+) -> EpisodeMatch:
+    observation = observation_from(row)
+    given = {
+        EpisodeFilter.WORDS if rank is None else EpisodeFilter.MEANING: query.words,
+        EpisodeFilter.PLACE: near,
+        EpisodeFilter.ROOM: query.room_id,
+        EpisodeFilter.LABEL: query.label,
+        EpisodeFilter.TIME: query.since or query.until,
+        EpisodeFilter.KIND: query.kind,
+        EpisodeFilter.MAP: query.map_id,
+    }
+    fitting = [] if query.words is None else [query.words]
+    if query.words is not None and rank is None:
+        fitting = shared_words(query.words, observation.searched_text)
+    key = None if query.label is None else name_key(query.label)
+    return EpisodeMatch(
+        observation=observation,
+        score_ratio=row["score"],
+        distance_m=None if near is None else observation.pose.point.distance_to(near),
+        filters=tuple(each for each, value in given.items() if value is not None),
+        fitting=tuple(fitting),
+        label=next((each for each in observation.labels if name_key(each) == key), None),
+        near=near,
+        near_id=None if anchor is None else anchor.observation.id,
+    )
 
 
 def _filters(query: EpisodeQuery, near: Point | None) -> _Where:

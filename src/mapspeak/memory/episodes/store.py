@@ -36,7 +36,6 @@ from mapspeak.memory.episodes.pictures import (
 from mapspeak.memory.episodes.searching import (
     COLUMNS,
     EpisodeSearch,
-    TextScorer,
     observation_from,
 )
 from mapspeak.memory.episodes.textindex import add_text
@@ -77,7 +76,7 @@ class EpisodeStore:
         self._named_pictures = named_pictures
         self.database = EpisodeDatabase(folder / "episodes.sqlite", lock_timeout_s=lock_timeout_s)
         self._pictures = PictureFolder(folder / "pictures")
-        self._scorer = TextScorer()
+        self._search = EpisodeSearch()
 
     # --- writing -----------------------------------------------------------------------------
 
@@ -144,8 +143,7 @@ class EpisodeStore:
         if not self.database.exists():
             return EpisodePage(matches=(), n_matches=0)
         with self.database.reading() as connection:
-            search = EpisodeSearch(connection=connection, scorer=self._scorer, rank=rank)
-            return search.find(query)
+            return self._search.find(connection, query, rank)
 
     def get(self, observation_id: str) -> Observation | None:
         """Return the observation with an id, or None."""
@@ -205,7 +203,7 @@ class EpisodeStore:
 
     # --- keeping order -----------------------------------------------------------------------
 
-    def thin(self, *, now: datetime, rule: ThinningRule | None = None) -> int:
+    def thin(self, *, now: datetime) -> int:
         """Drop the pictures that the rule does not keep, and return how many files went.
 
         Their observations stay. A crash in between leaves files that the next time removes.
@@ -213,7 +211,7 @@ class EpisodeStore:
         named = {Path(name).name for name in self._named_pictures()}
         with self.database.writing() as connection:
             stored = _stored_pictures(connection)
-            rule = rule or self._rule_when_full(stored)
+            rule = self._rule_when_full(stored)
             dropped = choose_dropped(stored, now=now, named=named, rule=rule)
             connection.executemany(
                 "UPDATE observations SET picture = NULL, picture_bytes = NULL WHERE picture = ?",

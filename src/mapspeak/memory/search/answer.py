@@ -55,6 +55,7 @@ KIND_WEIGHTS = {
     MatchKind.MISSPELT: 0.75,
     MatchKind.PART: 0.6,
 }
+WHOLE_WORD_WEIGHTS = KIND_WEIGHTS | {MatchKind.PART: 0.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,6 +17,7 @@ import numpy as np
 
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import (
+    WHOLE_WORD_WEIGHTS,
     Answer,
     Basis,
     Entry,
@@ -34,7 +35,6 @@ from mapspeak.memory.search.wordindex import (
     WordIndex,
     content_stems,
     content_words,
-    is_word,
     stem,
 )
 
@@ -98,9 +98,9 @@ class EntryIndex:
         said = [entry.texts for entry in self._entries]
         self._kinds = KindIndex(self._entries, said, vectors)
         common = [self._kinds.say_of(entry) for entry in self._entries]
-        self._words = WordIndex(said, is_known=is_word)
+        self._words = WordIndex(said)
         # A model compares meanings of what is commonly known, and needs no words of it.
-        self._common_words = WordIndex(common if vectors is None else (), is_known=is_word)
+        self._common_words = WordIndex(common if vectors is None else ())
         self._meanings = (
             None if vectors is None else MeaningIndex(self._entries, said, common, vectors)
         )
@@ -126,7 +126,7 @@ class EntryIndex:
         n_meant = self._count_meant(asked, order)
         verdict, is_sure = self._judge(asked, order, n_meant)
         is_missing = asked.missing is not None and _missing_ratio(asked, order) > 0
-        said = self._words.said_ratios(words)
+        said = self._words.score_ratios(words, WHOLE_WORD_WEIGHTS)
         return Answer(
             query=query,
             understood=understood,
@@ -153,12 +153,16 @@ class EntryIndex:
     def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
         common: tuple[AskedWords, ...] = ()
         part_ratios, missing = None, None
-        if self._vectors is None or self._meanings is None or not _is_in_latin_letters(understood):
+        # A model of English has nothing to compare in other letters.
+        is_latin = any(word.isascii() for _, word in content_words(understood))
+        if self._vectors is None or self._meanings is None or not is_latin:
             said_ratios = self._words.score_ratios(words)
             ratios = said_ratios
             if self._vectors is None:
                 common = self._common_words.ask(understood)
-                ratios = np.maximum(said_ratios, self._common_words.said_ratios(common))
+                ratios = np.maximum(
+                    said_ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS)
+                )
                 missing = self._kinds.find_missing_called(understood)
         else:
             vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
@@ -276,8 +280,3 @@ def _put_right(query: str, words: Iterable[AskedWords]) -> str:
 
 def _words_of(text: str) -> list[str]:
     return [word for _, word in content_words(text)]
-
-
-def _is_in_latin_letters(text: str) -> bool:
-    """Whether a model of English has anything to compare."""
-    return any(word.isascii() for _, word in content_words(text))

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -36,13 +36,9 @@ def read_wordpieces() -> tuple[str, ...]:
     return tuple(text.split("\n")[:-1])
 
 
-def is_word(word: str) -> bool:
-    """Whether a word in small letters without accents is one of the pieces as a whole."""
-    return word in _all_pieces()
-
-
 @cache
-def _all_pieces() -> frozenset[str]:
+def read_words() -> frozenset[str]:
+    """Read the words in small letters without accents that are a piece as a whole."""
     return frozenset(read_wordpieces())
 
 
@@ -119,18 +115,11 @@ class LookAlikes:
 
 
 class Vocabulary:
-    """The words of all records, ready to be asked for one of them.
+    """The words of all records, ready to be asked for one of them."""
 
-    Args:
-        is_known: Whether it is a word of the language, and so not a misspelt one.
-    """
-
-    def __init__(
-        self, words: Iterable[str], *, is_known: Callable[[str], bool] = lambda _: False
-    ) -> None:
+    def __init__(self, words: Iterable[str]) -> None:
         self._words = sorted(set(words))
         self._look_alikes = LookAlikes(self._words)
-        self._is_known = is_known
         self._of_stem: dict[str, list[str]] = defaultdict(list)
         for word in self._words:
             self._of_stem[stem(word)].append(word)
@@ -140,7 +129,7 @@ class Vocabulary:
     def is_doubtful(self, word: str) -> bool:
         """Whether a word is neither one of these nor a known one, and so perhaps misspelt."""
         ways = set(self.find_spellings(word).values())
-        return ways <= {MatchKind.MISSPELT} and not self._is_known(word)
+        return ways <= {MatchKind.MISSPELT} and word not in read_words()
 
     def find_spellings(self, word: str) -> dict[str, MatchKind]:
         """Find the words that count as this one, each with how; none where no word does."""
@@ -162,7 +151,7 @@ class Vocabulary:
         return sorted(word for own in stems for word in self._of_stem[own])
 
     def _misspelt(self, word: str) -> list[str]:
-        if len(word) < MIN_LETTERS or self._is_known(word):
+        if len(word) < MIN_LETTERS or word in read_words():
             return []
         return self._look_alikes.find(word, least_ratio=MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
 
@@ -204,9 +193,7 @@ class AskedWords:
 class WordIndex:
     """The words of records, each with the numbers of the records that say it."""
 
-    def __init__(
-        self, records: Sequence[Texts], *, is_known: Callable[[str], bool] = lambda _: False
-    ) -> None:
+    def __init__(self, records: Sequence[Texts]) -> None:
         self._records = records
         weights: dict[str, dict[int, float]] = defaultdict(dict)
         # Many records say the same.
@@ -222,7 +209,7 @@ class WordIndex:
             word: (np.array(list(found)), np.array(list(found.values())))
             for word, found in weights.items()
         }
-        self._vocabulary = Vocabulary(self._postings, is_known=is_known)
+        self._vocabulary = Vocabulary(self._postings)
 
     def ask(self, phrase: str) -> tuple[AskedWords, ...]:
         """Return words of a phrase that say what is meant, and what the records have of them."""
@@ -235,17 +222,10 @@ class WordIndex:
             found.append(AskedWords(shown, spellings, weight, is_doubtful))
         return tuple(found)
 
-    def score_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
-        """Return, for each record, how much of a phrase it says; rare words count more."""
-        return self._score_ratios(asked, KIND_WEIGHTS)
-
-    def said_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
-        """Return the same where a part of a longer word counts as nothing."""
-        return self._score_ratios(asked, KIND_WEIGHTS | {MatchKind.PART: 0.0})
-
-    def _score_ratios(
-        self, asked: Sequence[AskedWords], kind_weights: Mapping[MatchKind, float]
+    def score_ratios(
+        self, asked: Sequence[AskedWords], kind_weights: Mapping[MatchKind, float] = KIND_WEIGHTS
     ) -> NDArray[np.float64]:
+        """Return, for each record, how much of a phrase it says; rare words count more."""
         found = np.zeros(len(self._records))
         for word in asked:
             best = np.zeros(len(self._records))

@@ -113,10 +113,8 @@ class DurableFile:
             if status is not None and not os.access(target, os.W_OK):
                 raise PermissionError(errno.EACCES, "the file is read-only")
             temporary = target.with_name(f".{target.name}.tmp")
-            # Only a crash leaves one behind: the lock is held.
-            temporary.unlink(missing_ok=True)
             try:
-                after = _write_new(temporary, content, like=status)
+                after = write_synced(temporary, content, like=status)
                 if self.fingerprint() != expected:
                     return None
                 temporary.replace(target)
@@ -162,22 +160,24 @@ class DurableFile:
             raise SemanticMapError(message, hint=hint) from error
 
 
-def _write_new(path: Path, content: bytes, *, like: os.stat_result | None) -> Fingerprint:
+def write_synced(path: Path, content: bytes, *, like: os.stat_result | None = None) -> Fingerprint:
+    """Write a file anew; what it says, but not its name, is on the disk when this returns.
+
+    Args:
+        like: A file whose permissions and, as far as we may, owner it takes.
+    """
+    # Only a crash leaves one behind.
+    path.unlink(missing_ok=True)
     with path.open("xb") as file:
         if like is not None:
-            _take_after(path, like)
+            if sys.platform != "win32":
+                with contextlib.suppress(PermissionError):
+                    os.chown(path, like.st_uid, like.st_gid)
+            path.chmod(stat.S_IMODE(like.st_mode))
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
         return Fingerprint.of(os.fstat(file.fileno()))
-
-
-def _take_after(path: Path, like: os.stat_result) -> None:
-    """Return a new file the owner, as far as we may, and the permissions of another."""
-    if sys.platform != "win32":
-        with contextlib.suppress(PermissionError):
-            os.chown(path, like.st_uid, like.st_gid)
-    path.chmod(stat.S_IMODE(like.st_mode))
 
 
 def sync_folder(folder: Path) -> None:
