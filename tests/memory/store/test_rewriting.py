@@ -8,9 +8,9 @@ from ruamel.yaml.tokens import ScalarToken
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory import Landmark, Waypoint, name_key
+from mapspeak.memory import Landmark, Waypoint
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.rewriting import bound_to, moved, with_waypoint, without_waypoint
+from mapspeak.memory.store.rewriting import bound_to, moved, with_waypoint
 from mapspeak.memory.store.schema import record_data
 from waypoints import waypoints
 
@@ -176,34 +176,6 @@ def test_a_new_waypoint_stands_behind_the_last_one() -> None:
     assert head == HAND_WRITTEN.partition("lit: yes}  #21\n")[0]
     assert rest.startswith("  - name: Gate\n")
     assert rest.endswith("    geometric_features: []\n\ntail: [1, 2]  #22\n")
-
-
-def test_a_removed_waypoint_takes_only_its_own_lines_along() -> None:
-    changed = without_waypoint(document(HAND_WRITTEN), name_key("DOCK")).text
-
-    assert (
-        changed
-        == """\
-# places of the night shift #1
-version: 1   #2
-waypoints:   #3
-  # by the gate #4
-
-# before Hall #20
-  - {name: Hall, pose: {x: 0, y: 0, yaw_deg: 0}, lit: yes}  #21
-
-tail: [1, 2]  #22
-"""
-    )
-
-
-def test_the_last_waypoint_can_be_removed_and_the_first_written_again() -> None:
-    once = written("", DOCK)
-
-    empty = without_waypoint(document(once), name_key(DOCK.name))
-
-    assert empty.to_map().waypoints == ()
-    assert with_waypoint(empty, DOCK).text == once
 
 
 @pytest.mark.parametrize(

@@ -118,21 +118,6 @@ def test_the_folder_is_made_where_it_is_missing(tmp_path: Path) -> None:
     assert names(store) == ["dock"]
 
 
-def test_a_removed_waypoint_is_given_and_gone(store: SemanticMapStore) -> None:
-    store.write(place("Dock"))
-    hall = store.write(place("hall")).waypoint
-
-    assert store.remove("HALL") == hall
-    assert names(store) == ["Dock"]
-
-
-def test_removing_an_unknown_name_tells_the_names_near_to_it(store: SemanticMapStore) -> None:
-    store.write(place("Dock corner"))
-
-    with pytest.raises(SemanticMapError, match=r'No waypoint is called "dock".*"Dock corner"'):
-        store.remove("dock")
-
-
 def test_what_is_remembered_of_a_place_joins_what_was(store: SemanticMapStore) -> None:
     hose, tap = Landmark(label="hose"), Landmark(label="tap")
     store.remember(replace(place("dock"), safety_landmarks=(hose,)))

@@ -71,20 +71,6 @@ def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
     return written
 
 
-def without_waypoint(document: MapDocument, key: str) -> MapDocument:
-    """Return the file without one record; comments around it stay.
-
-    Raises:
-        SemanticMapError: The file is laid out in a way that cannot be written to.
-    """
-    record = document.records[key]
-    _require_cut(document, record.start)
-    before, after = document.text[: record.start], document.text[record.end :]
-    if before.endswith("\n\n") and after.startswith("\n"):
-        after = after[1:]
-    return _reparsed(document, before + after, keys=set(document.records) - {key})
-
-
 def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
     """Return the file with an event written: in its own record if its id is there already.
 

@@ -4,7 +4,6 @@ Reading and writing are synchronous and safe between processes and threads: a st
 but what it read last.
 """
 
-import difflib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from mapspeak.memory.merging import Merge, merge_waypoint
 from mapspeak.memory.quoting import clean_line, name_key, quote_name
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile, Fingerprint
-from mapspeak.memory.store.rewriting import bound_to, with_event, with_waypoint, without_waypoint
+from mapspeak.memory.store.rewriting import bound_to, with_event, with_waypoint
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 LOCK_TIMEOUT_S = 5.0
@@ -71,7 +70,9 @@ class SemanticMapStore:
             SemanticMapError: The file cannot be read, or has a fault and was never without one.
         """
         seen = self._look()
-        places = self._document_of(seen).to_map()
+        if seen.document is None:
+            raise _raised_again(seen.fault)
+        places = seen.document.to_map()
         return replace(places, warnings=(*places.warnings, *self._warnings(seen)))
 
     def read_events(self) -> tuple[Event, ...]:
@@ -79,14 +80,14 @@ class SemanticMapStore:
 
         Of a file that belongs to another map there are none: they are at other places here.
         """
-        document = self._read_document()
+        document = self._document()
         if not self._is_same_map(document.map_id):
             return ()
         return tuple(record.event for record in document.events.values())
 
     def read_entry(self, key: str) -> str | None:
         """Return what the file says under a key of its own, such as `snapshot`; as `read`."""
-        return self._read_document().find_entry(key)
+        return self._document().find_entry(key)
 
     def write_event(self, event: Event) -> Event:
         """Write an event, in its own record where its id is there already; return it with its id.
@@ -149,19 +150,8 @@ class SemanticMapStore:
             n_waypoints=len(after.records),
         )
 
-    def remove(self, name: str) -> Waypoint:
-        """Take a waypoint out of the map and return it.
-
-        Raises:
-            SemanticMapError: There is none of that name, or as for `write`.
-        """
-        before, _ = self._change(lambda document: _removed(document, name))
-        return before.records[name_key(name)].waypoint
-
-    def _read_document(self) -> MapDocument:
-        return self._document_of(self._look())
-
-    def _document_of(self, seen: _Seen) -> MapDocument:
+    def _document(self) -> MapDocument:
+        seen = self._look()
         if seen.document is None:
             raise _raised_again(seen.fault)
         return seen.document
@@ -251,18 +241,6 @@ def _say_map(map_id: str | None) -> str:
 def _known(document: MapDocument, key: str) -> Waypoint | None:
     record = document.records.get(key)
     return None if record is None else record.waypoint
-
-
-def _removed(document: MapDocument, name: str) -> MapDocument:
-    key = name_key(name)
-    if key in document.records:
-        return without_waypoint(document, key)
-    near = difflib.get_close_matches(key, document.records, n=3, cutoff=0.5)
-    names = ", ".join(quote_name(document.records[k].waypoint.name) for k in near)
-    raise SemanticMapError(
-        f"No waypoint is called {quote_name(name)}.",
-        hint=f"Near to it: {names}." if names else "List the waypoints to see their names.",
-    )
 
 
 def _raised_again(fault: SemanticMapError | None) -> SemanticMapError:
