@@ -50,11 +50,11 @@ def mark(label: str, bearing_deg: float = 0.0, range_m: float | None = None) -> 
 
 
 def check(*places: Waypoint, map_id: str | None = None) -> tuple[Things, tuple[MemoryFinding, ...]]:
-    memory = SemanticMap(waypoints=places)
+    memory = SemanticMap(map_id=map_id, waypoints=places)
     found = find_things(memory, GRID)
     distances = distances_from(GRID, Point(1.0, 1.0), radius_m=0.2)
     rooms = find_rooms(GRID)
-    return found, check_memory(memory, found, distances=distances, rooms=rooms, map_id=map_id)
+    return found, check_memory(memory, found, distances=distances, rooms=rooms)
 
 
 def kinds(*places: Waypoint, map_id: str | None = None) -> list[FindingKind]:

@@ -58,7 +58,7 @@ def _find_turns(old: MapSurfaces, new: MapSurfaces) -> list[float]:
         if len(turns) == N_TURNS or likeness[index] < least:
             break
         turn_rad = float(_peak(likeness, int(index))) * np.pi / N_BINS
-        if all(abs(_wrap_line(turn_rad - other)) > APART_RAD for other in turns):
+        if all(abs(wrap_angle(2 * (turn_rad - other))) > 2 * APART_RAD for other in turns):
             turns.append(turn_rad)
     return [wrap_angle(turn + half) for turn in turns for half in (0.0, np.pi)]
 
@@ -78,10 +78,6 @@ def _peak(values: FloatArray, index: int) -> float:
     low, middle, high = (values[(index + step) % len(values)] for step in (-1, 0, 1))
     curvature = low - 2 * middle + high
     return index + (0.5 * (low - high) / curvature if curvature < 0 else 0.0)
-
-
-def _wrap_line(angle_rad: float) -> float:
-    return (angle_rad + np.pi / 2) % np.pi - np.pi / 2
 
 
 # --- shifts ----------------------------------------------------------------------------------

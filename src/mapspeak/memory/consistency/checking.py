@@ -338,7 +338,6 @@ def check_memory(
     *,
     distances: DistanceField | None = None,
     rooms: RoomMap | None = None,
-    map_id: str | None = None,
 ) -> tuple[MemoryFinding, ...]:
     """Return all that is odd about a memory, in the order of its places; the same every time.
 
@@ -348,7 +347,7 @@ def check_memory(
     findings: list[MemoryFinding] = []
     misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}
     for waypoint in places.waypoints:
-        findings += check_pose(found.sight.grid, waypoint, distances, map_id or places.map_id)
+        findings += check_pose(found.sight.grid, waypoint, distances, places.map_id)
         if findings and findings[-1].kind is FindingKind.OFF_MAP:
             continue
         findings += check_rays(found, waypoint)

@@ -9,7 +9,6 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -23,33 +22,12 @@ _POLL_S = 0.005
 _FOLDER_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
 
 
-@dataclass(frozen=True, slots=True)
-class Fingerprint:
-    """What tells one state of a file from another without reading it."""
+Fingerprint = tuple[int, int, int, int, int]
+"""What tells one state of a file from another without reading it.
 
-    device: int
-    inode: int
-    n_bytes: int
-    modified_ns: int
-    changed_ns: int
-    """Unlike the time of modification, no program sets it back: `cp -p` and `touch -r` show."""
-
-    @classmethod
-    def of(cls, status: os.stat_result) -> "Fingerprint":
-        """Take it from what the file system says of a file."""
-        return cls(
-            status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
-        )
-
-    def renamed(self, later: "Fingerprint | None") -> "Fingerprint":
-        """Return the state once the file has its new name, which counts as a change of it.
-
-        Args:
-            later: What the file system says of it then; another file may be there already.
-        """
-        if later is None or replace(later, changed_ns=self.changed_ns) != self:
-            return self
-        return later
+Last comes the time of change: unlike that of modification, no program sets it back, so that
+`cp -p` and `touch -r` show.
+"""
 
 
 class DurableFile:
@@ -67,7 +45,7 @@ class DurableFile:
         """Return the file's present state; None where there is no file."""
         with self._explained("look at"):
             status = self._status()
-            return None if status is None else Fingerprint.of(status)
+            return None if status is None else _fingerprint_of(status)
 
     def read(self) -> tuple[bytes, Fingerprint | None]:
         """Return the content and the state it belongs to; nothing and None where no file is."""
@@ -78,7 +56,7 @@ class DurableFile:
             self._require_ordinary(status)
             with self.path.open("rb") as file:
                 # Taken before reading: a change meanwhile shows as another fingerprint later.
-                fingerprint = Fingerprint.of(os.fstat(file.fileno()))
+                fingerprint = _fingerprint_of(os.fstat(file.fileno()))
                 return file.read(MAX_BYTES + 1), fingerprint
 
     @contextlib.contextmanager
@@ -120,9 +98,10 @@ class DurableFile:
                 temporary.replace(target)
             finally:
                 temporary.unlink(missing_ok=True)
-            renamed = after.renamed(self.fingerprint())
+            renamed = self.fingerprint()
             sync_folder(target.parent)
-            return renamed
+            # A new name counts as a change; or another file is there already.
+            return renamed if renamed and renamed[:-1] == after[:-1] else after
 
     def _target(self) -> Path:
         with self._explained("find"):
@@ -160,6 +139,11 @@ class DurableFile:
             raise SemanticMapError(message, hint=hint) from error
 
 
+def _fingerprint_of(status: os.stat_result) -> Fingerprint:
+    times = status.st_mtime_ns, status.st_ctime_ns
+    return (status.st_dev, status.st_ino, status.st_size, *times)
+
+
 def write_synced(path: Path, content: bytes, *, like: os.stat_result | None = None) -> Fingerprint:
     """Write a file anew; what it says, but not its name, is on the disk when this returns.
 
@@ -177,7 +161,7 @@ def write_synced(path: Path, content: bytes, *, like: os.stat_result | None = No
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
-        return Fingerprint.of(os.fstat(file.fileno()))
+        return _fingerprint_of(os.fstat(file.fileno()))
 
 
 def sync_folder(folder: Path) -> None:

@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from mapspeak.memory.store.tree import (
     Data,
@@ -51,7 +50,9 @@ def flow_text(data: Data, key: str = "") -> str:
     if data is None:
         return "null"
     if isinstance(data, str):
-        return data if key in _BARE_KEYS or is_plain_in_flow(data) else _quoted(data)
+        # JSON's quotes are YAML's, except for characters that it would write as surrogate pairs.
+        is_bare = key in _BARE_KEYS or is_plain_in_flow(data)
+        return data if is_bare else json.dumps(data, ensure_ascii=False)
     if isinstance(data, list):
         return f"[{', '.join(flow_text(item) for item in data)}]"
     entries = (f"{name}: {flow_text(value, name)}" for name, value in data.items())
@@ -71,8 +72,10 @@ def entry_text(key: str, data: Data, *, indent: int) -> str:
     if isinstance(data, str) and "\n" in data:
         lines = (below + line if line else "\n" for line in data.split("\n"))
         return f"{key}: |-{''.join(lines)}"
-    if isinstance(data, list) and _is_better_below(data, len(key) + indent):
-        return f"{key}:" + "".join(f"{below}- {line_text(item)}" for item in data)
+    if isinstance(data, list):
+        has_mapping = any(isinstance(item, dict) for item in data)
+        if has_mapping or len(key) + indent + len(flow_text(data)) > MAX_COLUMNS:
+            return f"{key}:" + "".join(f"{below}- {line_text(item)}" for item in data)
     return f"{key}: {line_text(data, key)}"
 
 
@@ -83,23 +86,8 @@ def record_text(data: dict[str, Data], *, indent: int) -> str:
     return " " * indent + "- " + f"\n{margin}".join(entries) + "\n"
 
 
-def _is_better_below(items: list[Data], used_columns: int) -> bool:
-    has_mapping = any(isinstance(item, dict) for item in items)
-    return has_mapping or used_columns + len(flow_text(items)) > MAX_COLUMNS
-
-
-def _quoted(text: str) -> str:
-    # JSON's quotes are YAML's, except for characters that JSON would write as a surrogate pair.
-    return json.dumps(text, ensure_ascii=False)
-
-
-@dataclass(frozen=True, slots=True)
-class _Edit:
-    """The text from start to end gives way to another."""
-
-    start: int
-    end: int
-    text: str
+_Edit = tuple[int, int, str]
+"""From where to where the text gives way, and what it gives way to."""
 
 
 def edited_record(block: str, *, old: dict[str, Data], new: dict[str, Data]) -> str:
@@ -121,9 +109,9 @@ class _Editor:
     def applied(self, edits: Iterable[_Edit], start: int, end: int) -> str:
         """Return a stretch of the text with the edits that lie in it made."""
         pieces = []
-        for edit in sorted(edits, key=lambda edit: edit.start):
-            pieces += [self._text[start : edit.start], edit.text]
-            start = edit.end
+        for begin, stop, new in sorted(edits, key=lambda edit: edit[:2]):
+            pieces += [self._text[start:begin], new]
+            start = stop
         return "".join([*pieces, self._text[start:end]])
 
     # --- mappings ----------------------------------------------------------------------------
@@ -152,11 +140,11 @@ class _Editor:
         last = node.entries[-1][1].end
         if node.is_flow:
             entries = (f", {key}: {flow_text(value, key)}" for key, value in added.items())
-            return _Edit(last, last, "".join(entries))
+            return (last, last, "".join(entries))
         column, end = self._column(node.start), self._line_end(last)
         margin = "\n" + " " * column
         lines = (margin + entry_text(key, value, indent=column) for key, value in added.items())
-        return _Edit(end, end, "".join(lines))
+        return (end, end, "".join(lines))
 
     def _scalar_edit(self, parent: MappingNode, node: Node, key: str, new: Data) -> _Edit:
         if parent.is_flow:
@@ -165,12 +153,12 @@ class _Editor:
             return self._one_line_edit(node, line_text(new, key))
         entry = entry_text(key, new, indent=self._column(parent.start))
         value = entry.removeprefix(f"{key}:")
-        return _Edit(node.start, node.end, value if node.start == node.end else value.lstrip(" "))
+        return (node.start, node.end, value if node.start == node.end else value.lstrip(" "))
 
     def _one_line_edit(self, node: Node, value: str) -> _Edit:
         space = " " if self._text[node.start - 1 : node.start] == ":" else ""
         comments = comments_within(self._text, node)
-        return _Edit(node.start, node.end, space + value + self._behind(node, comments))
+        return (node.start, node.end, space + value + self._behind(node, comments))
 
     # --- lists -------------------------------------------------------------------------------
 
@@ -189,7 +177,7 @@ class _Editor:
         comments = comments_between(self._text, node.start, node.end, node.items)
         comments += [c for i in gone for c in comments_within(self._text, node.items[i])]
         value = f"[{', '.join(pieces)}]"
-        return _Edit(node.start, node.end, value + self._behind(node, comments))
+        return (node.start, node.end, value + self._behind(node, comments))
 
     def _block_list_edit(self, node: ListNode, old: list[Data], new: list[Data]) -> _Edit:
         sources, gone = _sources(old, new)
@@ -204,14 +192,14 @@ class _Editor:
         comments = [c for i in gone for c in comments_in(self._text, *spans[i], [node.items[i]])]
         margin = "\n" + " " * self._column(dashes[0])
         value = margin.join([*(lines or ["  []"]), *comments])
-        return _Edit(dashes[0], spans[-1][1], value)
+        return (dashes[0], spans[-1][1], value)
 
     def _continued(self, node: Node, span: tuple[int, int], old: Data, new: Data) -> str:
         edits: Iterable[_Edit] = ()
         if isinstance(node, MappingNode):
             edits = self.mapping_edits(node, _as_mapping(old), _as_mapping(new))
         elif old != new:
-            edits = [_Edit(node.start, node.end, flow_text(new))]
+            edits = [(node.start, node.end, flow_text(new))]
         return self.applied(edits, *span).rstrip()
 
     def _dashes(self, node: ListNode) -> Iterator[int]:

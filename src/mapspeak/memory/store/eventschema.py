@@ -106,7 +106,12 @@ def read_events(root: MappingNode | None) -> tuple[EventNode, ...]:
         raise TextError(message, hint=f"Write each event like `{_EXAMPLE}`.", offset=node.start)
     events: dict[str, EventNode] = {}
     for number, item in enumerate(node.items, start=1):
-        event = _event_of(item, number)
+        try:
+            event = _EventEntry.model_validate(item.data).to_event(number)
+        except ValidationError as error:
+            raise _fault_in(item, error) from error
+        except SemanticMapError as error:
+            raise TextError(error.message, hint=error.hint, offset=item.start) from error
         if event.id in events:
             raise TextError(
                 f"Two events have the id '{event.id}'.",
@@ -135,15 +140,6 @@ def event_data(event: Event) -> dict[str, Data]:
         "recorded_at": time_text(event.recorded_at),
     }
     return {key: value for key, value in entries.items() if value}
-
-
-def _event_of(item: Node, number: int) -> Event:
-    try:
-        return _EventEntry.model_validate(item.data).to_event(number)
-    except ValidationError as error:
-        raise _fault_in(item, error) from error
-    except SemanticMapError as error:
-        raise TextError(error.message, hint=error.hint, offset=item.start) from error
 
 
 def _fault_in(item: Node, error: ValidationError) -> TextError:

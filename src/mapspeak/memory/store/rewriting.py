@@ -36,7 +36,8 @@ def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
     text = document.text
     entry = entry_text(key, value, indent=0)
     present = document.root.find_value(key) if document.root else None
-    listed = document.root.find_key("waypoints") if document.root else None
+    keys = document.root.entries if document.root else ()
+    listed = next((name for name, _ in keys if name.text == "waypoints"), None)
     if present is not None:
         start, end = map(document.layout.offset_in_text, (present.start, present.end))
         text = text[:start].rstrip(" ") + entry.removeprefix(f"{key}:") + text[end:]

@@ -106,10 +106,6 @@ class MappingNode:
         """Return the node under a key."""
         return next((value for name, value in self.entries if name.text == key), None)
 
-    def find_key(self, key: str) -> ScalarNode | None:
-        """Return the node of the key itself."""
-        return next((name for name, _ in self.entries if name.text == key), None)
-
 
 Node = ScalarNode | ListNode | MappingNode
 

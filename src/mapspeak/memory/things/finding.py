@@ -28,13 +28,13 @@ ELSEWHERE_RAD = math.radians(30)
 """A view that points so far past a thing says that it is elsewhere."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False)
 class Located:
     """Views of one thing, where it is, and how well each view goes with the others."""
 
-    group: tuple[WeighedView, ...]
+    group: Group
     placement: Placement | None
-    agreements: tuple[float, ...]
+    agreements: list[float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,7 +56,8 @@ class Things:
     def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
         """Return True when nothing is between a waypoint and a point near by."""
         far_m = waypoint.pose.point.distance_to(point)
-        return far_m <= PLAIN_SIGHT_M and far_m <= self.free_m(waypoint, point) + BODY_M
+        free_m = self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)]
+        return bool(far_m <= PLAIN_SIGHT_M and far_m <= free_m + BODY_M)
 
     def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
         """Return the things with a place that were seen from a waypoint."""
@@ -65,10 +66,6 @@ class Things:
             for thing in self.things
             if thing.position is not None and waypoint.name in thing.waypoints
         )
-
-    def free_m(self, waypoint: Waypoint, point: Point) -> float:
-        """Return how far one sees from a waypoint towards a point before the first obstacle."""
-        return float(self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)])
 
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
         """Return how far one sees towards a point over what one may see over."""
@@ -133,30 +130,24 @@ def _order(waypoint: Waypoint) -> tuple[str, str, float, float, float]:
     return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad
 
 
-def _solve(sight: SightMap, pool: Sequence[WeighedView]) -> tuple[Located, ...]:
-    placed = [each for each in pool if each.likelihood is not None]
+def _solve(sight: SightMap, pool: Sequence[WeighedView]) -> list[Located]:
     posteriors = Posteriors(sight)
-    groups = join_sightings(posteriors, placed) if placed else []
-    agreed = [measure_agreement(sight, group) for group in groups]
-    located = [
-        (group, _place(posteriors, _agreeing(group, shares)))
-        for group, shares in zip(groups, agreed, strict=True)
-    ]
-    lost: list[Group] = [
-        [each] for each in pool if each.likelihood is None and not _add_to_nearest(located, each)
-    ]
-    return (
-        *(
-            Located(
-                group=tuple(group),
-                placement=placement,
-                # A view without a direction, which came later, says nothing of it.
-                agreements=shares + (1.0,) * (len(group) - len(shares)),
-            )
-            for (group, placement), shares in zip(located, agreed, strict=True)
-        ),
-        *(Located(group=tuple(group), placement=None, agreements=(1.0,)) for group in lost),
-    )
+    placed = [each for each in pool if each.likelihood is not None]
+    located = []
+    for group in join_sightings(posteriors, placed) if placed else []:
+        shares = measure_agreement(sight, group)
+        placement = _place(posteriors, _agreeing(group, shares))
+        located.append(Located(group=group, placement=placement, agreements=list(shares)))
+    for view in pool:
+        if view.likelihood is None:
+            near = _find_nearest(located, view)
+            if near is None:
+                near = Located(group=[], placement=None, agreements=[])
+                located.append(near)
+            near.group.append(view)
+            # A view without a direction says nothing of the place.
+            near.agreements.append(1.0)
+    return located
 
 
 def _place(posteriors: Posteriors, group: Group) -> Placement:
@@ -173,23 +164,21 @@ def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
     return kept if len(kept) >= 2 else group
 
 
-def _add_to_nearest(located: list[tuple[Group, Placement]], sighting: WeighedView) -> bool:
-    """Add a view without a direction to the nearest thing of its name; False where none is."""
-    here = sighting.waypoint.pose.point
+def _find_nearest(located: Sequence[Located], view: WeighedView) -> Located | None:
+    """Find the nearest thing of the name of a view without a direction."""
+    here = view.waypoint.pose.point
     near = [
-        (here.distance_to(placement.position), i)
-        for i, (group, placement) in enumerate(located)
-        if all(
-            each.waypoint is not sighting.waypoint
-            and name_the_same(each.landmark.label, sighting.landmark.label)
-            for each in group
+        (here.distance_to(each.placement.position), i)
+        for i, each in enumerate(located)
+        if each.placement is not None
+        and all(
+            other.waypoint is not view.waypoint
+            and name_the_same(other.landmark.label, view.landmark.label)
+            for other in each.group
         )
     ]
     off_m, i = min(near, default=(math.inf, -1))
-    if off_m > PLAIN_SIGHT_M:
-        return False
-    located[i][0].append(sighting)
-    return True
+    return located[i] if off_m <= PLAIN_SIGHT_M else None
 
 
 def _describe(found: Things, pool: Sequence[Located]) -> tuple[Thing, ...]:

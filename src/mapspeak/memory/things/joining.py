@@ -59,7 +59,7 @@ class _Ballot:
         self._ends = np.searchsorted(self.voters[self._by_voter], np.arange(len(sizes) + 1))
         log_priors = find_log_priors(sight, self.places, (each.update for each in likelihoods))
         n_places = len(self.places)
-        self._votes: FloatArray = log_priors + np.bincount(
+        self.votes: FloatArray = log_priors + np.bincount(
             self._at, weights=self._weights, minlength=n_places
         )
 
@@ -70,19 +70,15 @@ class _Ballot:
 
     def find_best(self) -> int | None:
         """Return the index of the place with most votes; None when no vote is left."""
-        best = int(np.argmax(self._votes))
-        return best if np.isfinite(self._votes[best]) else None
+        best = int(np.argmax(self.votes))
+        return best if np.isfinite(self.votes[best]) else None
 
     def take_out(self, voter: int) -> None:
         mine = self._by_voter[self._ends[voter] : self._ends[voter + 1]]
         at = self._at[mine]
-        self._votes[at] -= self._weights[mine]
+        self.votes[at] -= self._weights[mine]
         self._n_left[at] -= 1
-        self._votes[at[self._n_left[at] == 0]] = -np.inf
-
-    def strike(self, places: IntArray) -> None:
-        """Take places out at which nothing that is left can be."""
-        self._votes[places] = -np.inf
+        self.votes[at[self._n_left[at] == 0]] = -np.inf
 
 
 def group_names(labels: Sequence[str]) -> list[frozenset[str]]:
@@ -130,7 +126,8 @@ def _take_peaks(sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ball
         ratios[~is_left] = 0.0
         chosen = _choose(sightings, ratios)
         if not chosen:
-            ballot.strike(near)
+            # Nothing that is left can be there.
+            ballot.votes[near] = -np.inf
             continue
         groups.append([sightings[i] for i in chosen])
         is_left[chosen] = False
