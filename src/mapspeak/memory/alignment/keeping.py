@@ -270,7 +270,7 @@ class MapKeeper:
         return self._move(grid, comparison, comparison.fit)
 
     def finish_move(self) -> int:
-        """Move the observations that a crash has kept from it, and return how many these are."""
+        """Move observations that have not followed their records; return how many were moved."""
         return 0 if self._episodes is None else self._episodes.finish_move(at=self._name())
 
     def _move(self, grid: OccupancyGrid, comparison: MapComparison, fit: MapFit) -> RealignReceipt:
