@@ -133,15 +133,15 @@ def _content(output: Output, job: MapJob, loaded: LoadedMap, rooms: RoomMap) -> 
 
             text = MapFacts.of(loaded, graph).model_dump_json(indent=2) + "\n"
         case Output.GRAPH:
-            from mapspeak.spatial.areagraph.jsonforms import to_json  # noqa: PLC0415
+            from mapspeak.spatial.areagraph.files import to_json  # noqa: PLC0415
 
             text = to_json(graph)
         case Output.GEOJSON:
-            from mapspeak.spatial.areagraph.jsonforms import to_geojson  # noqa: PLC0415
+            from mapspeak.spatial.areagraph.files import to_geojson  # noqa: PLC0415
 
             text = to_geojson(graph, anchor=job.anchor)
         case Output.OSM:
-            from mapspeak.spatial.areagraph.osm import to_osm  # noqa: PLC0415
+            from mapspeak.spatial.areagraph.files import to_osm  # noqa: PLC0415
 
             text = to_osm(graph, anchor=job.anchor)
     return text.encode()
