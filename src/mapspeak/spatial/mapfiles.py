@@ -5,17 +5,18 @@ The rules are those of `nav2_map_server` since 2025: single precision, `occupied
 before that left out the equality and averaged transparency into the grey of trinary maps.)
 """
 
+import math
 import os
 import stat
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -37,15 +38,7 @@ _DEFAULT_OCCUPIED_THRESH, _DEFAULT_FREE_THRESH = 0.65, 0.196
 _SAVED_FREE_MAX, _SAVED_OCCUPIED_MIN = 25, 65
 _PICTURE_SUFFIXES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg"}
 _PICTURE_FORMATS = ("PPM", "PNG", "BMP", "JPEG")
-_EXAMPLES = {
-    "image": "image: map.pgm",
-    "resolution": "resolution: 0.05",
-    "origin": "origin: [-10.0, -10.0, 0.0]",
-    "occupied_thresh": "occupied_thresh: 0.65",
-    "free_thresh": "free_thresh: 0.196",
-    "negate": "negate: 0",
-    "mode": "mode: trinary",
-}
+_SWITCHES = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
 
 
 class MapMode(StrEnum):
@@ -96,20 +89,17 @@ class LoadedMap:
     warnings: tuple[MapFileWarning, ...]
 
 
-class _Description(BaseModel):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Description:
     """The .yaml beside a map's picture."""
 
-    model_config = ConfigDict(frozen=True)
-
-    image: str = Field(min_length=1)
-    resolution: FiniteFloat = Field(gt=0)
-    origin: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-    occupied_thresh: FiniteFloat
-    free_thresh: FiniteFloat
-    negate: bool
-    mode: Annotated[
-        MapMode, BeforeValidator(lambda said: said.lower() if isinstance(said, str) else said)
-    ] = MapMode.TRINARY
+    image: str
+    resolution: float
+    origin: Pose
+    occupied_thresh: float = _DEFAULT_OCCUPIED_THRESH
+    free_thresh: float = _DEFAULT_FREE_THRESH
+    negate: bool = False
+    mode: MapMode = MapMode.TRINARY
 
 
 def load_map(path: Path) -> LoadedMap:
@@ -130,15 +120,7 @@ def load_picture(path: Path, *, resolution_m: float) -> LoadedMap:
         MapError: The file is missing, damaged or too large, or the resolution is not positive.
     """
     grey, alpha = _read_picture(path)
-    description = _Description.model_construct(
-        image=path.name,
-        resolution=resolution_m,
-        origin=(0.0, 0.0, 0.0),
-        occupied_thresh=_DEFAULT_OCCUPIED_THRESH,
-        free_thresh=_DEFAULT_FREE_THRESH,
-        negate=False,
-        mode=MapMode.TRINARY,
-    )
+    description = _Description(image=path.name, resolution=resolution_m, origin=Pose(0.0, 0.0))
     return _build_map(description, grey, alpha, path)
 
 
@@ -177,11 +159,29 @@ def _build_map(description: _Description, grey: Grey, alpha: Grey | None, path: 
     cells = occupancy_of[grey]
     if alpha is not None and description.mode is not MapMode.RAW:
         cells[alpha < 255] = UNKNOWN
-    x, y, yaw_rad = description.origin
     grid = OccupancyGrid(
-        cells=cells[::-1], resolution_m=description.resolution, origin=Pose(x, y, yaw_rad)
+        cells=cells[::-1], resolution_m=description.resolution, origin=description.origin
     )
-    warnings = _find_warnings(description, occupancy_of, grey, grid)
+    n_unknown = int(np.count_nonzero(grey == _UNKNOWN_GREY))
+    mode, is_crossed = description.mode, description.free_thresh >= description.occupied_thresh
+    has = {
+        MapOddity.UNKNOWN_IS_FREE: mode is MapMode.TRINARY
+        and n_unknown > 0
+        and 0 <= occupancy_of[_UNKNOWN_GREY] <= FREE_MAX,
+        MapOddity.CROSSED_THRESHOLDS: is_crossed and mode is not MapMode.RAW,
+        MapOddity.NOTHING_FREE: not grid.free.any(),
+    }
+    warnings = tuple(
+        MapFileWarning(
+            oddity=oddity,
+            free_thresh=description.free_thresh,
+            occupied_thresh=description.occupied_thresh,
+            n_cells=n_unknown,
+            share_ratio=n_unknown / max(grey.size, 1),
+        )
+        for oddity, is_true in has.items()
+        if is_true
+    )
     return LoadedMap(grid=grid, name=path.stem, warnings=warnings)
 
 
@@ -203,34 +203,6 @@ def _occupancy_of_grey(description: _Description) -> NDArray[np.int8]:
     return occupancy.astype(np.int8)
 
 
-def _find_warnings(
-    description: _Description,
-    occupancy_of: NDArray[np.int8],
-    grey: Grey,
-    grid: OccupancyGrid,
-) -> tuple[MapFileWarning, ...]:
-    n_unknown = int(np.count_nonzero(grey == _UNKNOWN_GREY))
-    mode, is_crossed = description.mode, description.free_thresh >= description.occupied_thresh
-    has = {
-        MapOddity.UNKNOWN_IS_FREE: mode is MapMode.TRINARY
-        and n_unknown > 0
-        and 0 <= occupancy_of[_UNKNOWN_GREY] <= FREE_MAX,
-        MapOddity.CROSSED_THRESHOLDS: is_crossed and mode is not MapMode.RAW,
-        MapOddity.NOTHING_FREE: not grid.free.any(),
-    }
-    return tuple(
-        MapFileWarning(
-            oddity=oddity,
-            free_thresh=description.free_thresh,
-            occupied_thresh=description.occupied_thresh,
-            n_cells=n_unknown,
-            share_ratio=n_unknown / max(grey.size, 1),
-        )
-        for oddity, is_true in has.items()
-        if is_true
-    )
-
-
 def _read_description(path: Path) -> _Description:
     if path.suffix.lower() in _PICTURE_SUFFIXES:
         raise MapError(
@@ -238,10 +210,59 @@ def _read_description(path: Path) -> _Description:
             hint="Give the .yaml beside it, or the picture with its resolution in metres per cell.",
         )
     document = _parse_yaml(path)
-    try:
-        return _Description.model_validate(dict(document))
-    except ValidationError as error:
-        raise _say_wrong_value(path, document, error) from error
+    values: dict[str, Any] = {}
+    for key, (read, example) in _KEYS.items():
+        if key in document:
+            try:
+                values[key] = read(document[key])
+            except (TypeError, ValueError, LookupError, ArithmeticError) as error:
+                line = document.lc.key(key)[0] + 1
+                raise MapError(
+                    f"{path.name} line {line}: {key} cannot be {document[key]!r}.",
+                    hint=f"Write a line such as '{example}'.",
+                ) from error
+        elif key != "mode":
+            raise MapError(
+                f"{path.name} has no {key}.",
+                hint=f"Add a line for it, such as '{example}'; map_server refuses it too.",
+            )
+    return _Description(**values)
+
+
+def _text(said: object) -> str:
+    if not (isinstance(said, str) and said):
+        raise ValueError(said)
+    return said
+
+
+def _number(said: Any) -> float:  # noqa: ANN401 - anything a .yaml holds
+    number = float(said)
+    if not math.isfinite(number):
+        raise ValueError(said)
+    return number
+
+
+def _length(said: object) -> float:
+    if _number(said) <= 0:
+        raise ValueError(said)
+    return _number(said)
+
+
+def _pose(said: Iterable[object]) -> Pose:
+    x, y, yaw_rad = (_number(each) for each in said)
+    return Pose(x, y, yaw_rad)
+
+
+_KEYS: dict[str, tuple[Callable[[Any], object], str]] = {
+    "image": (_text, "image: map.pgm"),
+    "resolution": (_length, "resolution: 0.05"),
+    "origin": (_pose, "origin: [-10.0, -10.0, 0.0]"),
+    "occupied_thresh": (_number, "occupied_thresh: 0.65"),
+    "free_thresh": (_number, "free_thresh: 0.196"),
+    "negate": (lambda said: _SWITCHES[str(said).lower()], "negate: 0"),
+    "mode": (lambda said: MapMode(str(said).lower()), "mode: trinary"),
+}
+"""How each key of the .yaml is read, and an example of its line."""
 
 
 def _parse_yaml(path: Path) -> CommentedMap:
@@ -280,23 +301,6 @@ def _load_flat(text: str) -> object:
         if isinstance(event, AliasEvent) or depth > _MOST_NESTED:
             raise YAMLError("aliases or deep nesting")
     return YAML(typ="rt", pure=True).load(text)
-
-
-def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError) -> MapError:
-    """Return the first fault pydantic found, with the line of the file it stands in."""
-    fault = error.errors()[0]
-    key = str(fault["loc"][0])
-    if key not in document:
-        return MapError(
-            f"{path.name} has no {key}.",
-            hint=f"Add a line for it, such as '{_EXAMPLES[key]}'; map_server refuses it too.",
-        )
-    own_lines: dict[str, list[int]] = document.lc.data or {}
-    where = f" line {own_lines[key][0] + 1}" if key in own_lines else ""
-    return MapError(
-        f"{path.name}{where}: {key} cannot be {document[key]!r}: {fault['msg']}.",
-        hint=f"Write a line such as '{_EXAMPLES[key]}'.",
-    )
 
 
 def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
@@ -350,7 +354,7 @@ def _save_picture(grid: OccupancyGrid, path: Path, mode: MapMode) -> None:
 
 
 def _grey_of_occupancy(mode: MapMode) -> Grey:
-    """Return the grey of each occupancy from 0 to 100, and last, at index -1, that of unknown."""
+    """Return the grey of occupancy 0 to 100, and last, at index -1, of unknown."""
     occupancy = np.arange(101)
     if mode is MapMode.RAW:
         greys, unknown = occupancy, 255
