@@ -41,8 +41,8 @@ def colour_at(picture: MapPicture, point: Point) -> tuple[int, ...]:
 
 def colours_at(picture: MapPicture, points: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Gives the colours at points of shape (n, 2) that the picture shows; shape (n, 3)."""
-    pixels = [picture.view.pixel_at(Point(float(x), float(y))) for x, y in points]
-    return pixels_of(picture)[[pixel.v for pixel in pixels], [pixel.u for pixel in pixels]]
+    u, v = picture.view.pixels_at(points).T
+    return np.asarray(pixels_of(picture)[v, u])
 
 
 def is_colour(pixels: NDArray[np.uint8], colour: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -104,7 +104,6 @@ def test_the_arrow_points_along_the_heading_from_where_the_robot_is(yaw_rad: flo
     place = picture.view.fractional_pixels_at(np.array([[104.0, -17.0]]))[0]
     reach = np.stack([cols + 0.5 - place[0], place[1] - rows - 0.5])
     tip = reach[:, np.hypot(*reach).argmax()]
-    assert picture.has_robot
     assert math.atan2(tip[1], tip[0]) == pytest.approx(yaw_rad, abs=0.15)
     assert np.ptp(rows) + np.ptp(cols) >= 18
 
@@ -112,7 +111,6 @@ def test_the_arrow_points_along_the_heading_from_where_the_robot_is(yaw_rad: flo
 def test_a_robot_outside_the_map_is_not_drawn_in_a_corner() -> None:
     grid = grid_from_text(ROOM)
     picture = draw_robot_pose(grid, Pose(50.0, 50.0))
-    assert not picture.has_robot
     assert not is_colour(pixels_of(picture), full_colour(Colour.VERMILION)).any()
 
 

@@ -21,7 +21,7 @@ from mapspeak.spatial.picture.marks import (
     Zone,
 )
 from mapspeak.spatial.picture.plan import Zoom
-from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, PictureView, Pixel, paper_spacing_m
+from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, PictureView, paper_spacing_m
 
 __all__ = [
     "NORTH_UP_RAD",
@@ -36,7 +36,6 @@ __all__ = [
     "Mark",
     "PictureRegion",
     "PictureView",
-    "Pixel",
     "RegionLayer",
     "Shape",
     "Zone",

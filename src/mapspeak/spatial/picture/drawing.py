@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray, OccupancyGrid
 from mapspeak.spatial.picture import axes, ink, plan
@@ -35,7 +36,6 @@ from mapspeak.spatial.picture.marks import (
 )
 from mapspeak.spatial.picture.placing import place_labels
 from mapspeak.spatial.picture.regions import (
-    check_layer,
     colour_regions,
     find_poles,
     paint_regions,
@@ -53,6 +53,7 @@ from mapspeak.spatial.picture.view import (
 
 _GROUNDS = {FREE: "free", UNKNOWN_GROUND: "unknown", WALL: "wall"}
 _PAPER_GROUNDS = {int(GREYS[1]): "free", int(GREYS[0]): "unknown", int(GREYS[-1]): "occupied"}
+EDGE_PX = 1000
 _LEGEND_RIM_PX = 5
 _MAX_LEGEND_RATIO = 0.4
 
@@ -64,22 +65,12 @@ class MapPicture:
     Attributes:
         spacing_m: Between the lines of the metric grid; None where none is drawn.
         labels_left_out: Texts of things in the picture whose label found no room.
-        marks_outside: Labels of marks that lie outside the part of the map shown.
-        regions_outside: Texts of regions of which no part is shown.
     """
 
     png: bytes
     view: PictureView
     spacing_m: float | None = None
     labels_left_out: tuple[str, ...] = ()
-    marks_outside: tuple[str, ...] = ()
-    regions_outside: tuple[str, ...] = ()
-    has_robot: bool = False
-
-    @property
-    def media_type(self) -> str:
-        """The type of the encoded picture."""
-        return "image/png"
 
 
 _NO_LAYERS = MapLayers()
@@ -91,15 +82,14 @@ def draw_map(
     layers: MapLayers = _NO_LAYERS,
     up_rad: float = NORTH_UP_RAD,
     zoom: plan.Zoom | None = None,
-    max_edge_px: int = 1000,
+    max_edge_px: int = EDGE_PX,
 ) -> MapPicture:
     """Draw the known part of a map, or a closer look at some of it, as a PNG.
 
     Args:
         up_rad: The direction in the map that points up: pi/2 for y up, the robot's yaw for its own
             point of view.
-        zoom: The part to show; None for all that is known, the robot, and
-            a metre more.
+        zoom: The part to show; None for all that is known, the robot, and a metre more.
         max_edge_px: The longest side of the picture, 320 to 1072.
 
     Raises:
@@ -120,9 +110,14 @@ def draw_map(
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
     inside[:] = paint_ground(grid, view)
-    regions = None
+    regions = _no_regions(view)
     if layers.regions is not None:
-        check_layer(layers.regions, grid)
+        if layers.regions.labels.shape != grid.cells.shape:
+            raise MapError(
+                f"The regions cover {layers.regions.labels.shape} cells, the map has "
+                f"{grid.cells.shape}.",
+                hint="Find the regions of this map again.",
+            )
         regions = sample(layers.regions.labels, grid, view)
         colours = colour_regions(layers.regions, grid)
         paint_regions(inside, regions, layers.regions.regions, colours)
@@ -131,7 +126,7 @@ def draw_map(
     return _finish(canvas, view, layers, legend=replace(legend, grounds=seen), regions=regions)
 
 
-def draw_map_plain(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPicture:
+def draw_map_plain(grid: OccupancyGrid) -> MapPicture:
     """Draw the whole map in the paper's grey levels (eq. 1) and nothing else.
 
     In this and the next two row 0 of the grid is at the bottom, and a point of the world falls
@@ -140,19 +135,19 @@ def draw_map_plain(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPictur
     """
     extent = plan.extent_of_map(grid, NORTH_UP_RAD)
     view = plan.plan_view(
-        grid, extent, up_rad=NORTH_UP_RAD, margins=plan.Margins(), max_edge_px=max_edge_px
+        grid, extent, up_rad=NORTH_UP_RAD, margins=plan.Margins(), max_edge_px=EDGE_PX
     )
     return MapPicture(png=_encode(paint_paper_ground(grid, view)), view=view)
 
 
-def draw_map_axis(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPicture:
+def draw_map_axis(grid: OccupancyGrid, *, max_edge_px: int = EDGE_PX) -> MapPicture:
     """Draw the whole map with its axes and the paper's adaptive metric grid (eqs. 2 to 6)."""
     return _draw_with_axes(grid, MapLayers(), max_edge_px)
 
 
-def draw_robot_pose(grid: OccupancyGrid, robot: Pose, *, max_edge_px: int = 1000) -> MapPicture:
+def draw_robot_pose(grid: OccupancyGrid, robot: Pose) -> MapPicture:
     """Draw the same with the robot as an arrow along its heading (eq. 7)."""
-    return _draw_with_axes(grid, MapLayers(robot=robot), max_edge_px)
+    return _draw_with_axes(grid, MapLayers(robot=robot), EDGE_PX)
 
 
 def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers, max_edge_px: int) -> MapPicture:
@@ -163,7 +158,7 @@ def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers, max_edge_px: int) ->
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     view.area_of(canvas)[:] = paint_paper_ground(grid, view)
     axes.draw_axes(canvas, view, spacing_m)
-    return _finish(canvas, view, layers, legend=legend, regions=None)
+    return _finish(canvas, view, layers, legend=legend, regions=_no_regions(view))
 
 
 def _plan_sheet(
@@ -203,12 +198,12 @@ def _finish(
     layers: MapLayers,
     *,
     legend: Legend,
-    regions: NDArray[np.uint16] | None,
+    regions: NDArray[np.uint16],
 ) -> MapPicture:
     """Draw zones, lines, symbols, the robot, all labels and the legend; return the picture."""
     zones = paint_zones(view.area_of(canvas), view, layers.zones)
     named = _regions_of(layers)
-    poles = {} if regions is None else find_poles(regions, tuple(r.label for r in named))
+    poles = find_poles(regions, tuple(r.label for r in named)) if named else {}
     in_sight = tuple(region for region in named if region.label in poles)
     is_marked = view.shows_each(_points_of(layers.marks))
     robot = layers.robot
@@ -237,11 +232,6 @@ def _finish(
         view=replace(view, height_px=height_px),
         spacing_m=legend.spacing_m,
         labels_left_out=left_out,
-        marks_outside=tuple(
-            mark.label for mark in itertools.compress(layers.marks, ~is_marked) if mark.label
-        ),
-        regions_outside=tuple(r.text for r in named if r.text and r.label not in poles),
-        has_robot=shown.robot is not None,
     )
 
 
@@ -252,6 +242,10 @@ def _encode(canvas: Canvas) -> bytes:
     file = io.BytesIO()
     picture.save(file, "PNG", compress_level=1, compress_type=zlib.Z_RLE)
     return file.getvalue()
+
+
+def _no_regions(view: PictureView) -> NDArray[np.uint16]:
+    return np.zeros((view.area.height, view.area.width), np.uint16)
 
 
 def _regions_of(layers: MapLayers) -> tuple[PictureRegion, ...]:
@@ -267,7 +261,7 @@ def _draw_symbols(
     view: PictureView,
     shown: MapLayers,
     labels: list[Label],
-    regions: NDArray[np.uint16] | None,
+    regions: NDArray[np.uint16],
 ) -> tuple[str, ...]:
     """Draw lines, symbols, the robot and all labels; return the names left out.
 

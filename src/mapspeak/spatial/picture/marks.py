@@ -9,7 +9,6 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
 
 Canvas = NDArray[np.uint8]
@@ -136,9 +135,6 @@ ZERO_LINE_OVER = _build_grid_over(_ZERO_FREE, fill_offset=1)
 IS_BUSY = _build_is_busy()
 
 
-_MAX_LABEL = np.iinfo(np.uint16).max
-
-
 class Shape(StrEnum):
     """The symbol of a mark."""
 
@@ -226,23 +222,13 @@ class RegionLayer:
 
     Attributes:
         labels: uint16, the shape of the grid's cells; 0 belongs to no region.
-
-    Raises:
-        MapError: A label is not between 0 and 65535, or the array has not two dimensions.
     """
 
     labels: NDArray[np.uint16]
     regions: tuple[PictureRegion, ...]
 
     def __post_init__(self) -> None:
-        labels = np.asarray(self.labels)
-        in_range = labels.size == 0 or (labels.min() >= 0 and labels.max() <= _MAX_LABEL)
-        if labels.ndim != 2 or not in_range:
-            raise MapError(
-                f"The region labels have {labels.ndim} dimensions or leave 0..{_MAX_LABEL}.",
-                hint="Give an array of the grid's shape with small positive numbers, 0 for none.",
-            )
-        locked = np.array(labels, dtype=np.uint16, order="C")
+        locked = np.array(self.labels, dtype=np.uint16, order="C")
         locked.setflags(write=False)
         object.__setattr__(self, "labels", locked)
 

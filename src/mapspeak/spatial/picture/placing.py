@@ -84,7 +84,7 @@ class LabelField:
     """
 
     covered_before: NDArray[np.int32]
-    regions: NDArray[np.uint16] | None
+    regions: NDArray[np.uint16]
 
     def covered_ratio(self, boxes: IntArray) -> FloatArray:
         """Return the share of each box that lies on walls or drawn things."""
@@ -97,8 +97,6 @@ class LabelField:
     def needs_leader(self, boxes: IntArray, gaps_px: FloatArray, region: IntArray) -> Mask:
         """Return True where a box is far from its place, and not in the middle of its region."""
         is_far = gaps_px >= _LEADER_FROM_PX
-        if self.regions is None:
-            return is_far
         row, col = (boxes[:, 1] + boxes[:, 3]) // 2, (boxes[:, 0] + boxes[:, 2]) // 2
         return np.asarray(is_far & ((region == 0) | (self.regions[row, col] != region)))
 
@@ -108,8 +106,6 @@ class LabelField:
         That is outside its region, but for a box with a leader inside another region.
         """
         strayed = np.zeros(len(boxes))
-        if self.regions is None or not region.any():
-            return strayed
         named = np.flatnonzero(region)
         left, top, right, bottom = (boxes[named, i, np.newaxis, np.newaxis] for i in range(4))
         cols = left + (right - 1 - left) * _SAMPLES_ACROSS
@@ -172,7 +168,7 @@ def place_labels(
     labels: list[Label],
     *,
     obstacles: list[Box],
-    regions: NDArray[np.uint16] | None,
+    regions: NDArray[np.uint16],
 ) -> tuple[list[Placed], tuple[str, ...]]:
     """Return the labels with their places, and the names of those that found none.
 

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.errors import MapError
 from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
 from mapspeak.spatial.picture.marks import (
     FILLS,
@@ -71,15 +70,6 @@ def paint_regions(
     for region in regions:
         if region.is_highlighted:
             _highlight(ground, labels == region.label)
-
-
-def check_layer(layer: RegionLayer, grid: OccupancyGrid) -> None:
-    """Raise `MapError` where a layer of regions was made for another grid."""
-    if layer.labels.shape != grid.cells.shape:
-        raise MapError(
-            f"The regions cover {layer.labels.shape} cells, the map has {grid.cells.shape}.",
-            hint="Find the regions of this map again.",
-        )
 
 
 def _fill_by_label(

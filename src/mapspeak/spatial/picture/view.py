@@ -30,14 +30,6 @@ def is_north_up(up_rad: float) -> bool:
     return abs(math.remainder(up_rad - NORTH_UP_RAD, math.tau)) < _ANGLE_SLACK_RAD
 
 
-@dataclass(frozen=True, slots=True)
-class Pixel:
-    """One pixel of a picture: column u from the left, row v from the top."""
-
-    u: int
-    v: int
-
-
 class Box(NamedTuple):
     """A rectangle of pixels, which arrays are made of; right and bottom are the first outside."""
 
@@ -55,10 +47,6 @@ class Box(NamedTuple):
     def height(self) -> int:
         """Pixels from top to bottom."""
         return self.bottom - self.top
-
-    def contains(self, pixel: Pixel) -> bool:
-        """Return True when the pixel lies inside."""
-        return self.left <= pixel.u < self.right and self.top <= pixel.v < self.bottom
 
     def overlaps(self, other: "Box") -> bool:
         """Return True when the two share a pixel."""
@@ -88,19 +76,9 @@ class PictureView:
     width_px: int
     height_px: int
 
-    def pixel_at(self, point: Point) -> Pixel:
-        """Return the pixel a point falls in, which may lie outside the picture (see `shows`)."""
-        u, v = self.fractional_pixels_at(np.array([[point.x, point.y]]))[0]
-        return Pixel(math.floor(u + _BORDER_SLACK_PX), math.floor(v + _BORDER_SLACK_PX))
-
-    def point_at(self, pixel: Pixel) -> Point:
-        """Return the point of the map in the middle of a pixel."""
-        x, y = self.points_at(np.array([[pixel.u + 0.5, pixel.v + 0.5]]))[0]
-        return Point(float(x), float(y))
-
     def shows(self, point: Point) -> bool:
         """Return True when the point lies in the part of the map that the picture shows."""
-        return self.area.contains(self.pixel_at(point))
+        return bool(self.shows_each(np.array([[point.x, point.y]]))[0])
 
     def fractional_pixels_at(self, points: FloatArray) -> FloatArray:
         """Return (u, v) of shape (n, 2) as real numbers; a pixel's middle is at +0.5, +0.5.
@@ -113,9 +91,13 @@ class PictureView:
         v = self.area.top - self.pixels_per_m * (cos * dx + sin * dy)
         return np.stack([u, v], axis=1)
 
+    def pixels_at(self, points: FloatArray) -> IntArray:
+        """Return the pixels (u, v) that points fall in, which may lie outside the picture."""
+        return np.floor(self.fractional_pixels_at(points) + _BORDER_SLACK_PX).astype(np.intp)
+
     def shows_each(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return `shows` for points of shape (n, 2)."""
-        pixels = np.floor(self.fractional_pixels_at(points) + _BORDER_SLACK_PX)
+        pixels = self.pixels_at(points)
         first, end = (self.area.left, self.area.top), (self.area.right, self.area.bottom)
         return np.asarray(((pixels >= first) & (pixels < end)).all(axis=1))
 
