@@ -7,8 +7,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier, find_frontiers
 from mapspeak.spatial.frontiers.judging import merge_by_place
-from mapspeak.spatial.paths import clearance_m
-from mapspeak.spatial.visibility import cells_on_line
+from mapspeak.spatial.paths import Path, clearance_m
 
 RADIUS_M = 0.28
 COMFORT_M = 0.1
@@ -43,8 +42,8 @@ def test_before_a_passage_without_room_to_spare_the_pose_is_where_there_is_more(
     grid = hall_with_passage(width=12)
     (frontier,) = find_frontiers(grid, Point(1.5, 1.5), radius_m=RADIUS_M).frontiers
     assert room_m(grid, frontier) >= RADIUS_M + COMFORT_M
-    rows, cols = cells_on_line(grid, frontier.pose.point, frontier.anchor)
-    assert (grid.cells[rows, cols] == 0).all()
+    sight = Path.through((frontier.pose.point, frontier.anchor)).sampled(0.001)
+    assert all(grid.is_free(grid.cell_at(point)) for point in sight)
     assert frontier.pose.point.distance_to(frontier.anchor) <= RADIUS_M + 0.5
 
 

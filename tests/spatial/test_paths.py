@@ -15,7 +15,6 @@ from mapspeak.spatial.paths import (
     find_path,
     known_clearance_m,
 )
-from mapspeak.spatial.visibility import cells_on_line
 
 TWO_ROOMS = """
     ####################
@@ -32,8 +31,8 @@ TWO_ROOMS = """
 
 
 def cells_of(grid: OccupancyGrid, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    legs = [cells_on_line(grid, *ends) for ends in itertools.pairwise(path.points)]
-    return np.concatenate([leg[0] for leg in legs]), np.concatenate([leg[1] for leg in legs])
+    points = path.sampled(grid.resolution_m / 50)
+    return grid.cells_at(np.array([(point.x, point.y) for point in points]))
 
 
 def at(grid: OccupancyGrid, row: int, col: int) -> Point:
@@ -64,23 +63,6 @@ def test_known_clearance_treats_unknown_cells_and_the_outside_as_obstacles() -> 
     grid = grid_from_text(".....\n.....\n..?..\n.....\n.....")
     assert known_clearance_m(grid)[2].tolist() == [1.0, 1.0, 0.0, 1.0, 1.0]
     assert known_clearance_m(grid_from_text("...\n...\n..."))[1, 1] == 2.0
-
-
-def test_a_line_passes_every_cell_between_its_ends_in_order() -> None:
-    rows, cols = cells_on_line(grid_from_text("....\n...."), Point(0.5, 0.2), Point(3.5, 1.7))
-    assert rows.tolist() == [0, 0, 0, 1, 1]
-    assert cols.tolist() == [0, 1, 2, 2, 3]
-
-
-def test_a_line_through_a_corner_touches_all_four_cells_around_it() -> None:
-    grid = grid_from_text("..\n..")
-    rows, cols = cells_on_line(grid, Point(0.5, 0.5), Point(1.5, 1.5))
-    assert {*zip(rows.tolist(), cols.tolist(), strict=True)} == {(0, 0), (0, 1), (1, 0), (1, 1)}
-
-
-def test_a_line_from_a_point_to_itself_passes_one_cell() -> None:
-    rows, cols = cells_on_line(grid_from_text("..\n.."), Point(0.3, 1.2), Point(0.3, 1.2))
-    assert (rows.tolist(), cols.tolist()) == ([1], [0])
 
 
 def test_a_path_goes_through_the_door_and_ends_exactly_at_the_goal() -> None:

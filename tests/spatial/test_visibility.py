@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from drawing import grid_from_text
-from mapspeak.geometry import Point
-from mapspeak.spatial.visibility import cast_rays, cells_on_line, measure_sight
+from mapspeak.spatial.visibility import cast_rays, mean_on_line, measure_sight
 
 HALL = grid_from_text(
     """
@@ -57,14 +56,14 @@ def test_sight_ends_at_an_obstacle_or_where_it_is_to_end(reach: float, sight: fl
     assert measured[0] == pytest.approx(sight, abs=0.5)
 
 
-def test_a_line_through_a_corner_passes_all_four_cells_that_meet_there() -> None:
-    size_m = HALL.resolution_m
-    rows, cols = cells_on_line(
-        HALL, Point(0.5 * size_m, 0.5 * size_m), Point(1.5 * size_m, 1.5 * size_m)
-    )
-    assert sorted(zip(rows.tolist(), cols.tolist(), strict=True)) == [
-        (0, 0),
-        (0, 1),
-        (1, 0),
-        (1, 1),
-    ]
+def test_a_line_through_a_corner_touches_all_four_cells_that_meet_there() -> None:
+    values = np.ones((3, 3))
+    values[0, 1] = np.inf
+    assert mean_on_line(values, np.array([0.5, 0.5]), np.array([1.5, 1.5])) == np.inf
+    assert mean_on_line(values, np.array([1.5, 0.5]), np.array([2.5, 1.5])) == 1.0
+
+
+def test_the_mean_on_a_line_weighs_each_cell_by_its_share_of_the_line() -> None:
+    values = np.array([[1.0, 2.0, 3.0, 4.0]])
+    assert mean_on_line(values, np.array([0.5, 0.5]), np.array([0.5, 3.0])) == pytest.approx(2.2)
+    assert mean_on_line(values, np.array([0.2, 1.5]), np.array([0.2, 1.5])) == 2.0

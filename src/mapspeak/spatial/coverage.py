@@ -27,7 +27,6 @@ class Coverage:
     recall: float
     precision: float
     free_area_m2: float
-    reference_area_m2: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,13 +77,12 @@ def measure_coverage(
         )
     free = grid.free
     free_area_m2 = np.count_nonzero(free) * grid.resolution_m**2
-    reference_area_m2 = np.count_nonzero(truth) * reference.resolution_m**2
+    reference_m2 = np.count_nonzero(truth) * reference.resolution_m**2
     return Coverage(
-        paper_ratio=free_area_m2 / reference_area_m2,
+        paper_ratio=free_area_m2 / reference_m2,
         recall=_share_found(truth, reference, free, grid),
         precision=_share_found(free, grid, truth, reference) if free.any() else 1.0,
         free_area_m2=free_area_m2,
-        reference_area_m2=reference_area_m2,
     )
 
 

@@ -1,4 +1,4 @@
-"""Lines over a map: rays that are sampled, rays that end at obstacles, and exact lines of cells."""
+"""Lines over a map: rays that are sampled, rays that end at obstacles, and means along lines."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.geometry import Point
-from mapspeak.spatial.grid import FloatArray, IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 
 _Reals = NDArray[np.floating[Any]]
 _FARTHEST_CELL = 1e6
@@ -88,20 +87,6 @@ def measure_sight(
     return np.minimum(far, farthest)
 
 
-def cells_on_line(grid: OccupancyGrid, start: Point, end: Point) -> tuple[IntArray, IntArray]:
-    """Return rows and columns of all cells that the line passes, in order, both ends included.
-
-    The cells may lie outside the array. A line through the very corner of four cells gives all
-    four, so that nothing is seen or driven between two walls that touch at a corner.
-    """
-    ends = grid.fractional_cells_at(np.array([[start.x, start.y], [end.x, end.y]]))
-    cells, _ = _pieces(ends[0], ends[1])
-    corners = _corners(cells)
-    beside = _cells_beside(cells, corners).reshape(-1, 2)
-    cells = np.insert(cells, np.repeat(corners + 1, 2), beside, axis=0)
-    return cells[:, 0], cells[:, 1]
-
-
 def mean_on_line(values: NDArray[np.floating[Any]], start: FloatArray, end: FloatArray) -> float:
     """Return the mean of a map of values along the line between two places, in fractional cells.
 
@@ -111,12 +96,14 @@ def mean_on_line(values: NDArray[np.floating[Any]], start: FloatArray, end: Floa
     mean = float(values[cells[:, 0], cells[:, 1]] @ shares)
     if not math.isfinite(mean):
         return mean
-    corners = _corners(cells)
-    if corners.size:
-        beside = _cells_beside(cells, corners)
-        if np.isinf(values[beside[..., 0], beside[..., 1]]).any():
-            return math.inf
-    return mean
+    # Through the very corner of four cells a line goes on diagonally, and touches all four.
+    before, after = cells[:-1], cells[1:]
+    is_corner = (before != after).all(axis=1)
+    if not is_corner.any():
+        return mean
+    (rows, cols), (next_rows, next_cols) = before[is_corner].T, after[is_corner].T
+    touched = np.concatenate([values[rows, next_cols], values[next_rows, cols]])
+    return math.inf if np.isinf(touched).any() else mean
 
 
 def _pieces(start: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -139,19 +126,6 @@ def _pieces(start: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
     middles = ((borders[:-1] + borders[1:]) / 2)[is_piece]
     cells = np.floor(start + middles[:, None] * (end - start)).astype(np.intp)
     return cells, shares[is_piece]
-
-
-def _cells_beside(cells: IntArray, corners: IntArray) -> IntArray:
-    """Return, for each corner that a line goes through, the two cells it touches there."""
-    before, after = cells[corners], cells[corners + 1]
-    turned = np.stack([before[:, 0], after[:, 1]], axis=1)
-    return np.stack([turned, before + after - turned], axis=1)
-
-
-def _corners(cells: IntArray) -> IntArray:
-    """Return after which cells a line goes on diagonally."""
-    is_turned = cells[1:] != cells[:-1]
-    return np.flatnonzero(is_turned[:, 0] & is_turned[:, 1])
 
 
 def _passed(starts: _Reals, offsets: _Reals) -> NDArray[np.int32]:

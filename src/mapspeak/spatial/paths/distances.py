@@ -16,7 +16,7 @@ from mapspeak.spatial.paths.lattice import (
     build_narrow_lattice,
     with_passable,
 )
-from mapspeak.spatial.paths.route import Path, find_path_near, find_seeds
+from mapspeak.spatial.paths.route import Path, find_path_near, find_seeds, find_way
 from mapspeak.spatial.paths.wavefront import Costs, descend, spread
 
 
@@ -63,16 +63,19 @@ class DistanceField:
         index = self.lattice.index_at(point)
         return index if index is not None and math.isfinite(self.costs[index]) else None
 
+    def _descend_to(self, point: Point) -> IntArray | None:
+        goal = self._find_reached(point)
+        return None if goal is None else descend(self.lattice.moves, None, self.costs, goal)
+
     def is_reachable(self, point: Point) -> bool:
         """Return True where the robot can drive to from the start."""
         return self.distance_to(point) is not None
 
     def path_to(self, point: Point) -> Path | None:
         """Find a way near the shortest one, off walls as far as its surroundings allow."""
-        goal = self._find_reached(point)
-        if goal is None:
+        way = self._descend_to(point)
+        if way is None:
             return None
-        way = descend(self.lattice.moves, None, self.costs, goal)
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
 
     def cheapest_path_to(self, point: Point, weights: Costs) -> Path | None:
@@ -81,22 +84,18 @@ class DistanceField:
         Args:
             weights: What a metre costs in each cell of the map, 1 or more.
         """
-        goal = self._find_reached(point)
-        seeds = find_seeds(self.lattice, self.start, radius_m=self.radius_m)
-        if goal is None or seeds is None:
-            return None
         coarse = self.lattice.coarsened(weights)
-        costs = spread(self.lattice.moves, coarse, seeds, goals=np.array([goal]))
-        way = descend(self.lattice.moves, coarse, costs, goal)
         ends = (self.start, point)
+        way = find_way(self.lattice, coarse, ends, radius_m=self.radius_m)
+        if way is None:
+            return None
         return find_path_near(self.lattice, way, ends, radius_m=self.radius_m, weights=weights)
 
     def way_to(self, point: Point) -> tuple[Point, ...] | None:
         """Return the shortest way from cell to cell, good enough to draw; `path_to` is to drive."""
-        goal = self._find_reached(point)
-        if goal is None:
+        way = self._descend_to(point)
+        if way is None:
             return None
-        way = descend(self.lattice.moves, None, self.costs, goal)
         rows, cols = np.divmod(way, self.lattice.n_cols)
         n = self.lattice.factor
         points = self.lattice.grid.points_at(rows * n + n // 2, cols * n + n // 2)

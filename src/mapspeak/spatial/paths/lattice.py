@@ -125,10 +125,9 @@ def build_fine_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
 
 def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
     """Return the lattice that suits the map's size: of two by two cells where it is large."""
-    if grid.cells.size < LARGE_MAP:
-        return build_fine_lattice(grid, radius_m)
     clearance = clearance_m(grid)
-    return _halve(grid, clearance, grid.free & (clearance >= radius_m))
+    build = _fine if grid.cells.size < LARGE_MAP else _halve
+    return build(grid, clearance, grid.free & (clearance >= radius_m))
 
 
 def build_narrow_lattice(lattice: Lattice, radius_m: float) -> Lattice:

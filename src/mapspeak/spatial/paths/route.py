@@ -74,7 +74,7 @@ def find_path(grid: OccupancyGrid, start: Point, goal: Point, *, radius_m: float
     """
     lattice = build_coarse_lattice(grid, radius_m)
     weights = _wall_weights(lattice, radius_m)
-    way = _find_way(lattice, weights, (start, goal), radius_m)
+    way = find_way(lattice, weights, (start, goal), radius_m=radius_m)
     if way is None:
         return None
     if lattice.factor == 1:
@@ -102,13 +102,14 @@ def find_path_near(
     costs = _wall_weights(corridor, radius_m)
     if weights is not None:
         costs = costs * weights[window]
-    way = _find_way(corridor, costs, ends, radius_m)
+    way = find_way(corridor, costs, ends, radius_m=radius_m)
     return None if way is None else straighten(corridor, costs, way, ends)
 
 
-def _find_way(
-    lattice: Lattice, weights: Costs, ends: tuple[Point, Point], radius_m: float
+def find_way(
+    lattice: Lattice, weights: Costs, ends: tuple[Point, Point], *, radius_m: float
 ) -> IntArray | None:
+    """Find the cheapest way over the cells of a lattice; None where there is none."""
     goal = lattice.index_at(ends[1])
     seeds = find_seeds(lattice, ends[0], radius_m=radius_m)
     if goal is None or seeds is None:
