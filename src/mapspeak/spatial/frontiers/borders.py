@@ -39,8 +39,9 @@ def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[B
     that touch at a corner. Outside the array everything is unknown.
     """
     free = grid.free.view(np.uint8)
-    edge = _edge(grid.unknown.view(np.uint8), free, side=max(_cells(THINNEST_UNKNOWN_M, grid), 1))
-    labels = _labelled(edge, free, reach=_cells(JOIN_M, grid))
+    side = max(round(THINNEST_UNKNOWN_M / grid.resolution_m), 1)
+    edge = _edge(grid.unknown.view(np.uint8), free, side=side)
+    labels = _labelled(edge, free, reach=round(JOIN_M / grid.resolution_m))
     cells = np.flatnonzero(edge)
     of_cell = labels.ravel()[cells]
     order = np.argsort(of_cell, kind="stable")
@@ -52,12 +53,8 @@ def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[B
     kept = np.flatnonzero(lengths_m >= least_length_m)
     ends = np.append(starts[1:], rows.size)
     borders = (
-        Border(
-            rows=rows[starts[index] : ends[index]],
-            cols=cols[starts[index] : ends[index]],
-            length_m=float(lengths_m[index]),
-        )
-        for index in kept
+        Border(rows=rows[first:end], cols=cols[first:end], length_m=float(length_m))
+        for first, end, length_m in zip(starts[kept], ends[kept], lengths_m[kept], strict=True)
     )
     return tuple(borders), starts.size - kept.size
 
@@ -104,10 +101,6 @@ def _lengths(rows: IntArray, cols: IntArray, starts: IntArray) -> NDArray[np.flo
     wide = np.maximum.reduceat(cols, starts) - np.minimum.reduceat(cols, starts) + 1
     across = np.where(n_cells > 1, np.hypot(high, wide), 1.0)
     return np.asarray(np.maximum(n_cells, across), dtype=np.float64)
-
-
-def _cells(length_m: float, grid: OccupancyGrid) -> int:
-    return round(length_m / grid.resolution_m)
 
 
 WIDTH_STEP_M = 0.1

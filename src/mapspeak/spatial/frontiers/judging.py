@@ -26,6 +26,7 @@ from mapspeak.spatial.frontiers.viewpoints import (
     FrontierViewpoint,
     find_viewpoints,
     find_views,
+    rows_and_cols,
 )
 from mapspeak.spatial.grid import Cell, OccupancyGrid
 from mapspeak.spatial.paths.distances import DistanceField, distances_from
@@ -133,8 +134,8 @@ def _judge(
     parts_beyond = find_parts_beyond(distances, [border for border, _ in poor])
     for (border, gain_m2), beyond in zip(poor, parts_beyond, strict=True):
         if beyond is None:
-            nothing = _refuse(distances, border, RefusalReason.NOTHING_TO_SEE)
-            refused.append(dataclasses.replace(nothing, gain_m2=gain_m2, least_gain_m2=least_m2))
+            gains = {"gain_m2": gain_m2, "least_gain_m2": least_m2}
+            refused.append(_refuse(distances, border, RefusalReason.NOTHING_TO_SEE, **gains))
         else:
             cut_off.append(beyond)
     return frontiers, refused + _refuse_cut_off(distances, cut_off)
@@ -144,13 +145,13 @@ def _without_looked(
     distances: DistanceField, viewpoints: list[FrontierViewpoint], looked_from: Sequence[Point]
 ) -> list[FrontierViewpoint]:
     """Return the viewpoints from which the robot has not looked yet."""
-    if not looked_from:
-        return viewpoints
-    places = [(viewpoint, distances.grid.point_at(viewpoint.cell)) for viewpoint in viewpoints]
     return [
         viewpoint
-        for viewpoint, place in places
-        if all(place.distance_to(looked) > LOOKED_NEAR_M for looked in looked_from)
+        for viewpoint in viewpoints
+        if all(
+            distances.grid.point_at(viewpoint.cell).distance_to(looked) > LOOKED_NEAR_M
+            for looked in looked_from
+        )
     ]
 
 
@@ -162,9 +163,7 @@ def _find_poses(
     viewpoints = [viewpoint for _, own in borders for viewpoint in own]
     cells = [viewpoint.cell for viewpoint in viewpoints]
     views = find_views(grid, distances.clearances_m, cells)
-    rows = np.array([cell.row for cell in cells], dtype=np.intp)
-    cols = np.array([cell.col for cell in cells], dtype=np.intp)
-    distances_m = distances.distances_at(rows, cols).tolist()
+    distances_m = distances.distances_at(*rows_and_cols(cells)).tolist()
     options = zip(viewpoints, views.find_gains(), distances_m, strict=True)
     frontiers = []
     for border, own in borders:
@@ -191,27 +190,31 @@ def _find_poses(
     return frontiers
 
 
-def _refuse(distances: DistanceField, border: Border, reason: RefusalReason) -> RefusedFrontier:
+def _refuse(
+    distances: DistanceField, border: Border, reason: RefusalReason, **numbers: float
+) -> RefusedFrontier:
     middle = find_middle(border.rows, border.cols)
     anchor = Cell(int(border.rows[middle]), int(border.cols[middle]))
     return RefusedFrontier(
-        anchor=distances.grid.point_at(anchor), length_m=border.length_m, reason=reason
+        anchor=distances.grid.point_at(anchor), length_m=border.length_m, reason=reason, **numbers
     )
 
 
 def _refuse_cut_off(distances: DistanceField, borders: Sequence[Border]) -> list[RefusedFrontier]:
     """Refuse borders that no viewpoint is near to."""
-    refused = []
-    for border, width_m in zip(borders, find_gap_widths_m(distances, borders), strict=True):
-        if width_m is None:
-            refused.append(_refuse(distances, border, RefusalReason.NO_WAY))
-        else:
-            narrow = _refuse(distances, border, RefusalReason.TOO_NARROW)
-            needed_m = 2 * distances.radius_m
-            refused.append(
-                dataclasses.replace(narrow, gap_width_m=width_m, needed_width_m=needed_m)
-            )
-    return refused
+    needed_m = 2 * distances.radius_m
+    return [
+        _refuse(distances, border, RefusalReason.NO_WAY)
+        if width_m is None
+        else _refuse(
+            distances,
+            border,
+            RefusalReason.TOO_NARROW,
+            gap_width_m=width_m,
+            needed_width_m=needed_m,
+        )
+        for border, width_m in zip(borders, find_gap_widths_m(distances, borders), strict=True)
+    ]
 
 
 def merge_by_place(frontiers: list[Frontier]) -> list[Frontier]:

@@ -230,12 +230,17 @@ def find_views(grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Ce
     )
 
 
+def rows_and_cols(cells: Sequence[Cell]) -> tuple[IntArray, IntArray]:
+    """Return the rows and the columns of some cells."""
+    rows, cols = np.array([(cell.row, cell.col) for cell in cells], dtype=np.intp).reshape(-1, 2).T
+    return rows, cols
+
+
 def _look(
     grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Cell], steps: FloatArray
 ) -> tuple[Mask, Mask]:
     """Return where rays are over the unknown, and where no wall hides them; by place, ray, step."""
-    rows = np.array([place.row for place in places], dtype=np.intp)
-    cols = np.array([place.col for place in places], dtype=np.intp)
+    rows, cols = rows_and_cols(places)
     middles = np.stack([rows, cols], axis=1) + 0.5
     rays = cast_rays(grid.cells.shape, middles, angles_rad=_ANGLES_RAD, steps=steps)
     solid_m = np.minimum(clearances_m[rows, cols], WALL_HOLE_M / 2)
