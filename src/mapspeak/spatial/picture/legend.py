@@ -47,6 +47,7 @@ _SCALE_BAR_PX = 80
 _SWATCH_PX = 14
 _WIDE_SWATCH_PX = 24
 _ARROW_SCALE = 0.6
+_SMALL_SAMPLES = {*Shape, LegendSample.ORIGIN}
 
 Draw = Callable[[Canvas, int, int], None]
 """Draws a sample on a canvas, from a column on, around a row."""
@@ -155,16 +156,12 @@ def _items(legend: Legend, view: PictureView) -> list[_Item]:
         *(
             _Item(
                 text=entry.text,
-                sample_px=_SWATCH_PX if _is_small(entry) else _WIDE_SWATCH_PX,
+                sample_px=_SWATCH_PX if entry.sample in _SMALL_SAMPLES else _WIDE_SWATCH_PX,
                 draw=partial(_draw_sample, entry=entry),
             )
             for entry in legend.entries
         ),
     ]
-
-
-def _is_small(entry: LegendEntry) -> bool:
-    return isinstance(entry.sample, Shape) or entry.sample is LegendSample.ORIGIN
 
 
 def _draw_sample(canvas: Canvas, left: int, middle: int, *, entry: LegendEntry) -> None:

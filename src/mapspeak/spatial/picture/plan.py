@@ -202,15 +202,13 @@ def _extent_of_corners(
     grid: OccupancyGrid, up_rad: float, rows: IntArray, cols: IntArray
 ) -> Extent:
     """Return the extent of cell corners: each row number with each column number."""
-    row_grid, col_grid = (axis.ravel() for axis in np.meshgrid(rows, cols, indexing="ij"))
-    return _extent_of_points(_corner_points(grid, row_grid, col_grid), up_rad)
+    corners = _corner_points(grid, np.repeat(rows, cols.size), np.tile(cols, rows.size))
+    return _extent_of_points(corners, up_rad)
 
 
 def _corner_points(grid: OccupancyGrid, rows: IntArray, cols: IntArray) -> FloatArray:
     """Return the corners of cells that lie towards the grid's origin."""
-    zero = np.array([0])
-    half_cell = grid.points_at(zero, zero) - np.array([grid.origin.x, grid.origin.y])
-    return np.asarray(grid.points_at(rows, cols) - half_cell)
+    return grid.points_at(rows - 0.5, cols - 0.5)
 
 
 def _extent_of_points(points: FloatArray, up_rad: float) -> Extent:

@@ -3,7 +3,6 @@
 from mapspeak.spatial.rooms.along import CorridorWalk, DoorSide, PassedDoor, walk_along
 from mapspeak.spatial.rooms.finding import find_rooms
 from mapspeak.spatial.rooms.identity import match_rooms
-from mapspeak.spatial.rooms.raster import RoomSettings
 from mapspeak.spatial.rooms.room_map import Door, Region, RoomClass, RoomMap, Vanished
 
 __all__ = [
@@ -14,7 +13,6 @@ __all__ = [
     "Region",
     "RoomClass",
     "RoomMap",
-    "RoomSettings",
     "Vanished",
     "find_rooms",
     "match_rooms",

@@ -12,7 +12,7 @@ from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask, OccupancyGrid, Window
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
-from mapspeak.spatial.rooms.raster import Raster, RoomSettings, build_raster, find_cells
+from mapspeak.spatial.rooms.raster import Raster, build_raster, find_cells
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Labels, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
@@ -231,21 +231,18 @@ def find_rooms(
     grid: OccupancyGrid,
     *,
     previous: RoomMap | None = None,
-    settings: RoomSettings | None = None,
 ) -> RoomMap:
     """Divide a map into rooms, corridors and open spaces, joined by doors.
 
     Args:
         grid: The map; may be empty, unexplored, furnished, noisy or turned.
         previous: What was found on an earlier state of this map; its ids are kept.
-        settings: Only for experiments; the default fits every building.
 
     Raises:
         MapError: The map has more cells than can be handled.
     """
-    settings = settings or RoomSettings()
-    raster = build_raster(grid, cell_size_m=settings.cell_size_m)
-    segmentation = segment(raster, settings)
+    raster = build_raster(grid)
+    segmentation = segment(raster)
     openings = find_openings(segmentation)
     shapes = measure_regions(segmentation)
     labels = _labels_on_grid(raster, segmentation.labels)

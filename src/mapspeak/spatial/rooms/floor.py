@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.furniture import find_blocks
-from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, drop_specks, find_cells
+from mapspeak.spatial.rooms.raster import SETTINGS, Picture, Raster, drop_specks, find_cells
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -38,12 +38,12 @@ class Floor:
     standing_m: NDArray[np.float32] | None
 
 
-def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
+def build_floor(raster: Raster) -> Floor:
     """Return the floor with its furniture cleared away."""
-    directions = find_wall_directions(raster.occupied, least_ratio=settings.direction_ratio)
-    wall, obstacle = find_walls(raster, directions, settings)
-    pocket = settings.pocket_area_m2 / raster.cell_area_m2
-    block, behind = find_blocks(raster, wall, directions[0] if directions else 0.0, settings)
+    directions = find_wall_directions(raster.occupied, least_ratio=SETTINGS.direction_ratio)
+    wall, obstacle = find_walls(raster, directions)
+    pocket = SETTINGS.pocket_area_m2 / raster.cell_area_m2
+    block, behind = find_blocks(raster, wall, directions[0] if directions else 0.0)
     standing_m = None
     if block.any():
         with_blocks = _clear(raster.free, raster.occupied, wall, pocket)
@@ -53,7 +53,7 @@ def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
     occupied = (raster.occupied & (1 - block)) | behind
     floor = _clear(free, occupied, wall, pocket)
     # Parts that nothing joins and that are too small for a room are none.
-    floor = drop_specks(floor, settings.room_area_m2 / raster.cell_area_m2)
+    floor = drop_specks(floor, SETTINGS.room_area_m2 / raster.cell_area_m2)
     return Floor(
         floor=floor,
         wall=wall,
@@ -120,9 +120,7 @@ _APART_DEG = 6
 """Main directions differ by more than this."""
 
 
-def find_walls(
-    raster: Raster, directions_deg: list[float], settings: RoomSettings
-) -> tuple[Picture, Picture]:
+def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Picture]:
     """Return 1 where an obstacle is wall, and 1 where it is no island that furniture could be.
 
     Wall is a long run in a main direction, or in line with one.
@@ -133,23 +131,23 @@ def find_walls(
     size_m = raster.cell_size_m
     occupied = raster.occupied
     thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
-    large, slender = _sort_obstacles(raster.free, settings.island_size_m / size_m)
-    side = max(round(settings.wall_thickness_m / size_m), 1)
+    large, slender = _sort_obstacles(raster.free, SETTINGS.island_size_m / size_m)
+    side = max(round(SETTINGS.wall_thickness_m / size_m), 1)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     is_thick = np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8)
     can_be_piece = (large | slender) & (1 - is_thick)
     wall = np.zeros_like(occupied)
     for angle_deg in directions_deg:
         for turned_deg in (angle_deg, angle_deg + 90):
-            long_run = _open(thick, settings.wall_length_m / size_m, turned_deg) & occupied & large
+            long_run = _open(thick, SETTINGS.wall_length_m / size_m, turned_deg) & occupied & large
             piece = (
-                _open(thick, settings.wall_piece_m / size_m, turned_deg) & occupied & can_be_piece
+                _open(thick, SETTINGS.wall_piece_m / size_m, turned_deg) & occupied & can_be_piece
             )
-            reach = _line(2 * settings.wall_reach_m / size_m, turned_deg)
+            reach = _line(2 * SETTINGS.wall_reach_m / size_m, turned_deg)
             in_line = np.asarray(cv2.dilate(long_run, reach), np.uint8)
             wall |= long_run | (piece & in_line)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
-        wall |= _open(thick, settings.oblique_length_m / size_m, turned_deg) & occupied & large
+        wall |= _open(thick, SETTINGS.oblique_length_m / size_m, turned_deg) & occupied & large
     return wall, occupied & large
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.raster import (
+    SETTINGS,
     Picture,
     Raster,
-    RoomSettings,
     Truths,
     drop_small,
     drop_specks,
@@ -47,9 +47,7 @@ Counts = NDArray[np.intp]
 Numbers = NDArray[np.int32]
 
 
-def find_blocks(
-    raster: Raster, wall: Picture, angle_deg: float, settings: RoomSettings
-) -> tuple[Picture, Picture]:
+def find_blocks(raster: Raster, wall: Picture, angle_deg: float) -> tuple[Picture, Picture]:
     """Return 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
@@ -58,7 +56,7 @@ def find_blocks(
     """
     free, occupied, wall = turn_upright(raster.free, raster.occupied, wall, angle_deg)
     solid = 1 - drop_specks(free, _SPECK_M2 / raster.cell_area_m2)
-    found = _find_blocks(solid, occupied, wall, _Sizes(solid, raster.cell_size_m, settings))
+    found = _find_blocks(solid, occupied, wall, _Sizes(solid, raster.cell_size_m))
     shape = raster.free.shape[0], raster.free.shape[1]
     block, behind = (turn_back(picture, shape, angle_deg) for picture in found)
     return block, behind & (1 - block)
@@ -76,17 +74,17 @@ class _Sizes:
         gap: The widest door whose wall runs on in line.
     """
 
-    def __init__(self, solid: Picture, cell_size_m: float, settings: RoomSettings) -> None:
-        self.depth = round(settings.block_depth_m / cell_size_m) | 1
-        self.thick = round(settings.block_thickness_m / cell_size_m) | 1
-        wall = settings.block_ratio * _find_wall_thickness(
-            solid, self.thick, 2 * settings.oblique_length_m / cell_size_m
+    def __init__(self, solid: Picture, cell_size_m: float) -> None:
+        self.depth = round(SETTINGS.block_depth_m / cell_size_m) | 1
+        self.thick = round(SETTINGS.block_thickness_m / cell_size_m) | 1
+        wall = SETTINGS.block_ratio * _find_wall_thickness(
+            solid, self.thick, 2 * SETTINGS.oblique_length_m / cell_size_m
         )
-        self.thin = max(round(settings.block_depth_m / cell_size_m) + 2, round(wall)) | 1
-        self.long = round(settings.block_length_m / cell_size_m)
-        self.stub = round(settings.stub_m / cell_size_m) | 1
-        self.tip = round(settings.tip_m / cell_size_m)
-        self.gap = round(settings.wall_length_m / cell_size_m)
+        self.thin = max(round(SETTINGS.block_depth_m / cell_size_m) + 2, round(wall)) | 1
+        self.long = round(SETTINGS.block_length_m / cell_size_m)
+        self.stub = round(SETTINGS.stub_m / cell_size_m) | 1
+        self.tip = round(SETTINGS.tip_m / cell_size_m)
+        self.gap = round(SETTINGS.wall_length_m / cell_size_m)
         self.rim = round(_RIM_M / cell_size_m)
         self.crumb = _CRUMB_M / cell_size_m
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import IntArray
 from mapspeak.spatial.rooms.floor import Floor
-from mapspeak.spatial.rooms.raster import Picture, RoomSettings, find_cells
+from mapspeak.spatial.rooms.raster import SETTINGS, Picture, find_cells
 from mapspeak.spatial.visibility import cast_rays
 
 MAX_ROOMS = int(np.iinfo(np.int16).max)
@@ -204,14 +204,13 @@ def merge_basins(
     *,
     frames: Frames,
     cell_area_m2: float,
-    settings: RoomSettings,
 ) -> NDArray[np.int32]:
     """Return room numbers from 1, the largest room first; 0 where no room is."""
     forest = _plant(basins, clearance_m, standing_m, cell_area_m2)
-    _join_equal_widths(forest, saddles, settings.same_width_ratio)
-    borders = _join_open_borders(forest, saddles, frames, settings)
-    _absorb_small(forest, borders, settings)
-    return _number_by_area(basins, forest, settings.room_area_m2)
+    _join_equal_widths(forest, saddles, SETTINGS.same_width_ratio)
+    borders = _join_open_borders(forest, saddles, frames)
+    _absorb_small(forest, borders)
+    return _number_by_area(basins, forest, SETTINGS.room_area_m2)
 
 
 def _plant(
@@ -243,9 +242,7 @@ def _join_equal_widths(forest: _Forest, saddles: list[Saddle], same_ratio: float
             forest.join(narrow, wide)
 
 
-def _join_open_borders(
-    forest: _Forest, saddles: list[Saddle], frames: Frames, settings: RoomSettings
-) -> list[_Border]:
+def _join_open_borders(forest: _Forest, saddles: list[Saddle], frames: Frames) -> list[_Border]:
     """Join across every saddle that divides nothing, from the highest down; return the others."""
     borders = []
     for saddle in saddles:
@@ -253,50 +250,48 @@ def _join_open_borders(
         if narrow == wide:
             continue
         if saddle.is_doorway:
-            borders.append((saddle, settings.frame_m))
+            borders.append((saddle, SETTINGS.frame_m))
             continue
         # Taking furniture away may open a place, but makes no doors by widening what is beside.
         clearance_m, wide_m = forest.standing_m[narrow], forest.clearance_m[wide]
-        if _is_narrow(clearance_m, wide_m, saddle, settings):
+        if _is_narrow(clearance_m, wide_m, saddle):
             wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
             # The more wall is in line with a door, the less narrow it must be.
-            share = min(wall_m / settings.frame_m, 1.0)
-            ratio = settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
+            share = min(wall_m / SETTINGS.frame_m, 1.0)
+            ratio = SETTINGS.gap_ratio + share * (SETTINGS.door_ratio - SETTINGS.gap_ratio)
             if saddle.height <= ratio * clearance_m:
                 borders.append((saddle, wall_m))
                 continue
-        if _is_mouth(forest, narrow, wide, saddle, settings):
+        if _is_mouth(forest, narrow, wide, saddle):
             borders.append((saddle, 0.0))
         else:
             forest.join(narrow, wide)
     return borders
 
 
-def _is_narrow(clearance_m: float, wide_m: float, saddle: Saddle, settings: RoomSettings) -> bool:
+def _is_narrow(clearance_m: float, wide_m: float, saddle: Saddle) -> bool:
     """Return True where a door could be, if there is enough wall in line with it.
 
     A place that is hardly narrower than both sides, such as a corridor beside a pillar, is none.
     """
     width_m = 2 * saddle.height
-    is_leaf = width_m <= settings.leaf_width_m or saddle.height <= settings.wide_ratio * wide_m
-    is_door_wide = is_leaf and width_m <= settings.door_width_m
-    return is_door_wide and saddle.height <= settings.door_ratio * clearance_m
+    is_leaf = width_m <= SETTINGS.leaf_width_m or saddle.height <= SETTINGS.wide_ratio * wide_m
+    is_door_wide = is_leaf and width_m <= SETTINGS.door_width_m
+    return is_door_wide and saddle.height <= SETTINGS.door_ratio * clearance_m
 
 
-def _is_mouth(
-    forest: _Forest, narrow: int, wide: int, saddle: Saddle, settings: RoomSettings
-) -> bool:
+def _is_mouth(forest: _Forest, narrow: int, wide: int, saddle: Saddle) -> bool:
     """Return True where a corridor opens into a much wider place without getting narrower."""
     clearance_m, area_m2 = forest.clearance_m[narrow], forest.area_m2[narrow]
     return (
-        2 * saddle.height <= settings.mouth_width_m
-        and clearance_m <= settings.mouth_ratio * forest.clearance_m[wide]
-        and area_m2 >= settings.mouth_elongation * (2 * clearance_m) ** 2
-        and area_m2 >= settings.mouth_area_m2
+        2 * saddle.height <= SETTINGS.mouth_width_m
+        and clearance_m <= SETTINGS.mouth_ratio * forest.clearance_m[wide]
+        and area_m2 >= SETTINGS.mouth_elongation * (2 * clearance_m) ** 2
+        and area_m2 >= SETTINGS.mouth_area_m2
     )
 
 
-def _absorb_small(forest: _Forest, borders: list[_Border], settings: RoomSettings) -> None:
+def _absorb_small(forest: _Forest, borders: list[_Border]) -> None:
     """Join what is too small for a room across its widest border, until nothing is."""
     changed = True
     while changed:
@@ -305,9 +300,9 @@ def _absorb_small(forest: _Forest, borders: list[_Border], settings: RoomSetting
             narrow, wide = forest.sides(saddle)
             area_m2 = min(forest.area_m2[narrow], forest.area_m2[wide])
             # A niche has no door frame: it must be larger than a room.
-            is_framed = wall_m >= settings.frame_m / 2
-            is_framed &= 2 * saddle.height >= settings.least_door_m
-            least_m2 = settings.room_area_m2 if is_framed else settings.niche_area_m2
+            is_framed = wall_m >= SETTINGS.frame_m / 2
+            is_framed &= 2 * saddle.height >= SETTINGS.least_door_m
+            least_m2 = SETTINGS.room_area_m2 if is_framed else SETTINGS.niche_area_m2
             if narrow != wide and area_m2 < least_m2:
                 forest.join(narrow, wide)
                 changed = True

@@ -89,6 +89,8 @@ class RoomSettings:
     niche_area_m2: float = 4.0
 
 
+SETTINGS = RoomSettings()
+
 Picture = NDArray[np.uint8]
 
 MAX_GRID_CELLS = 120_000_000
@@ -136,8 +138,8 @@ def find_cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.in
     return rows, cols
 
 
-def build_raster(grid: OccupancyGrid, *, cell_size_m: float) -> Raster:
-    """Return the known part of a map in cells of about the wanted size.
+def build_raster(grid: OccupancyGrid) -> Raster:
+    """Return the known part of a map in cells of about the size set.
 
     Raises:
         MapError: The map has more cells than can be handled.
@@ -150,7 +152,7 @@ def build_raster(grid: OccupancyGrid, *, cell_size_m: float) -> Raster:
     is_known = grid.cells >= 0
     rows, cols = _extent(np.any(is_known, axis=1)), _extent(np.any(is_known, axis=0))
     known = grid.cells[rows, cols]
-    shrink, grow = _factors(known.size, grid.resolution_m, cell_size_m)
+    shrink, grow = _factors(known.size, grid.resolution_m)
     if known.size == 0:
         known = np.full((1, 1), UNKNOWN, np.int8)
     free = _resize((known >= 0) & (known <= FREE_MAX), shrink=shrink, grow=grow, full=True)
@@ -172,12 +174,12 @@ def _extent(used: NDArray[np.bool_]) -> slice:
     return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 0)
 
 
-def _factors(n_cells: int, resolution_m: float, cell_size_m: float) -> tuple[int, int]:
+def _factors(n_cells: int, resolution_m: float) -> tuple[int, int]:
     """Return by how much to shrink and to grow; one of the two is 1."""
-    shrink = max(1, round(cell_size_m / resolution_m))
+    shrink = max(1, round(SETTINGS.cell_size_m / resolution_m))
     while n_cells / shrink**2 > MAX_RASTER_CELLS:
         shrink += 1
-    grow = min(MAX_UPSCALING, max(1, round(resolution_m / cell_size_m)))
+    grow = min(MAX_UPSCALING, max(1, round(resolution_m / SETTINGS.cell_size_m)))
     while grow > 1 and n_cells * grow**2 > MAX_RASTER_CELLS:
         grow -= 1
     return (shrink, 1) if shrink > 1 else (1, grow)

@@ -20,11 +20,11 @@ from mapspeak.spatial.rooms.merging import (
     merge_basins,
 )
 from mapspeak.spatial.rooms.raster import (
+    SETTINGS,
     Affine,
     Picture,
     Places,
     Raster,
-    RoomSettings,
     Truths,
     find_cells,
     is_upright,
@@ -65,7 +65,7 @@ class Doorway:
         return round(row), round(col)
 
 
-def find_doorways(raster: Raster, floor: Floor, settings: RoomSettings) -> list[Doorway]:
+def find_doorways(raster: Raster, floor: Floor) -> list[Doorway]:
     """Return the wide openings in line with the strongest walls, or at right angles to them.
 
     One jamb is the end of something thin that runs on in line; the other is such an end too, or
@@ -75,11 +75,11 @@ def find_doorways(raster: Raster, floor: Floor, settings: RoomSettings) -> list[
         return []
     jamb = floor.wall | floor.obstacle
     pictures = [jamb, floor.wall, floor.solid, floor.floor & (1 - jamb)]
-    margin = round(max(settings.stub_m, settings.tip_m) / raster.cell_size_m) + 2
+    margin = round(max(SETTINGS.stub_m, SETTINGS.tip_m) / raster.cell_size_m) + 2
     turned, back = _turn(pictures, floor.directions_deg[0], margin)
     sideways = [np.asarray(cv2.transpose(picture), np.uint8) for picture in turned]
-    rows = _find_along_rows(turned, back, raster, settings)
-    cols = _find_along_rows(sideways, back[:, [1, 0, 2]], raster, settings)
+    rows = _find_along_rows(turned, back, raster)
+    cols = _find_along_rows(sideways, back[:, [1, 0, 2]], raster)
     reach = _SHARED_M / raster.cell_size_m
     return _leave_out_crossing(rows, cols, reach) + _leave_out_crossing(cols, rows, reach)
 
@@ -103,32 +103,28 @@ def _turn(pictures: list[Picture], angle_deg: float, margin: int) -> tuple[list[
     return [*closed, turned & (1 - closed[0])], back
 
 
-def _find_along_rows(
-    pictures: list[Picture], back: Affine, raster: Raster, settings: RoomSettings
-) -> list[Doorway]:
+def _find_along_rows(pictures: list[Picture], back: Affine, raster: Raster) -> list[Doorway]:
     jamb, wall, solid, floor = pictures
-    row, first, stop = _find_gaps(floor, jamb, raster, settings)
-    jambs = _Jambs(wall, solid, raster.cell_size_m, settings)
+    row, first, stop = _find_gaps(floor, jamb, raster)
+    jambs = _Jambs(wall, solid, raster.cell_size_m)
     left_end, right_end = jambs.is_end(row, first - 1, -1), jambs.is_end(row, stop, 1)
     left_corner, right_corner = jambs.is_corner(row, first - 1, -1), jambs.is_corner(row, stop, 1)
     chosen = (left_end & (right_end | right_corner)) | (right_end & left_corner)
     openings = _choose_narrowest(
         row[chosen], first[chosen], stop[chosen], round(_APART_M / raster.cell_size_m)
     )
-    longest = round(settings.wall_length_m / raster.cell_size_m)
+    longest = round(SETTINGS.wall_length_m / raster.cell_size_m)
     return [_doorway(opening, solid, longest, back, raster.cell_size_m) for opening in openings]
 
 
-def _find_gaps(
-    floor: Picture, jamb: Picture, raster: Raster, settings: RoomSettings
-) -> tuple[Places, Places, Places]:
+def _find_gaps(floor: Picture, jamb: Picture, raster: Raster) -> tuple[Places, Places, Places]:
     """Return row, first column and the column behind the last of floor between jambs."""
     # The margin is no floor, so that changes come in pairs and no run goes on in the next row.
     change = np.flatnonzero(floor.ravel()[1:] != floor.ravel()[:-1]) + 1
     first, stop = change[::2], change[1::2]
     width_m = (stop - first) * raster.cell_size_m
     cells = jamb.ravel()
-    chosen = (width_m > settings.leaf_width_m) & (width_m <= settings.door_width_m)
+    chosen = (width_m > SETTINGS.leaf_width_m) & (width_m <= SETTINGS.door_width_m)
     chosen &= (cells[first - 1] & cells[stop]) > 0
     row, first_col = np.divmod(first[chosen], floor.shape[1])
     return row, first_col, first_col + (stop - first)[chosen]
@@ -142,12 +138,10 @@ class _Jambs:
         solid: 1 where nothing is free.
     """
 
-    def __init__(
-        self, wall: Picture, solid: Picture, cell_size_m: float, settings: RoomSettings
-    ) -> None:
+    def __init__(self, wall: Picture, solid: Picture, cell_size_m: float) -> None:
         self._wall, self._solid = wall > 0, solid > 0
-        self._stub = max(round(settings.stub_m / cell_size_m), 1)
-        self._tip = max(round(settings.tip_m / cell_size_m), 1)
+        self._stub = max(round(SETTINGS.stub_m / cell_size_m), 1)
+        self._tip = max(round(SETTINGS.tip_m / cell_size_m), 1)
 
     def is_end(self, row: Places, col: Places, step: int) -> Truths:
         """Return True at the end of something thin that runs on in the direction of the step."""
@@ -257,11 +251,11 @@ class Segmentation:
     labels: Labels
 
 
-def segment(raster: Raster, settings: RoomSettings) -> Segmentation:
+def segment(raster: Raster) -> Segmentation:
     """Cut the floor at its narrow places, and at the doorways that these do not show."""
-    floor = build_floor(raster, settings)
-    labels = _divide(floor, floor, [], raster, settings)
-    unseen = find_doorways(raster, floor, settings)
+    floor = build_floor(raster)
+    labels = _divide(floor, floor, [], raster)
+    unseen = find_doorways(raster, floor)
     beside = round(_BESIDE_M / raster.cell_size_m)
     doorways: list[Doorway] = []
     # A cut changes the clearances, by which other doorways were seen: so look again.
@@ -270,7 +264,7 @@ def segment(raster: Raster, settings: RoomSettings) -> Segmentation:
         unseen = [doorway for doorway in unseen if doorway not in missed]
         cut = _draw(doorways, floor.floor)
         cut_floor = cut_away(floor, cut, raster.cell_size_m)
-        labels = _divide(floor, cut_floor, doorways, raster, settings)
+        labels = _divide(floor, cut_floor, doorways, raster)
         labels = _fill(labels, cut)
     return Segmentation(raster=raster, floor=floor, labels=labels)
 
@@ -280,10 +274,9 @@ def _divide(
     cut_floor: Floor,
     doorways: list[Doorway],
     raster: Raster,
-    settings: RoomSettings,
 ) -> Labels:
     """Return room numbers; basins end where the floor has been cut at the doorways."""
-    sigma = settings.smoothing_m / raster.cell_size_m
+    sigma = SETTINGS.smoothing_m / raster.cell_size_m
     height = _smooth(cut_floor.clearance_m, cut_floor.floor, sigma)
     standing = floor.standing_m
     basins = build_basins(height, cut_floor.floor)
@@ -295,7 +288,6 @@ def _divide(
         sorted(saddles, key=lambda saddle: -saddle.height),
         frames=Frames(floor, raster.cell_size_m),
         cell_area_m2=raster.cell_area_m2,
-        settings=settings,
     )
 
 
