@@ -27,7 +27,6 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 Mask = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
-_Numbers = NDArray[np.number[Any]]
 Window = tuple[slice, slice]
 """Rows and columns of a part of an array."""
 
@@ -202,8 +201,8 @@ class OccupancyGrid:
         """Return (row, col) of shape (n, 2) as real numbers; a cell's centre is at +0.5, +0.5."""
         return np.stack(self._in_cells(points[:, 0], points[:, 1]), axis=1)
 
-    def points_at(self, rows: _Numbers, cols: _Numbers) -> FloatArray:
-        """Return the centres of cells in metres, shape (n, 2); corners are half a cell off."""
+    def points_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
+        """Return the centres of cells in metres, shape (n, 2)."""
         return np.stack(self._in_metres(rows, cols), axis=1)
 
     def _in_cells(self, x: Any, y: Any) -> tuple[Any, Any]:  # noqa: ANN401 - numbers or arrays

@@ -102,7 +102,6 @@ def test_the_verdict_says_what_is_left(verdict: FrontierVerdict, words: str) -> 
     report = FrontierReport(
         frontiers=(frontier(BEST),),
         refused=(refused(RefusalReason.NO_WAY),),
-        n_unlisted=0,
         verdict=verdict,
         n_named=1,
     )
@@ -114,7 +113,6 @@ def test_the_most_frequent_refusal_is_told_first() -> None:
     report = FrontierReport(
         frontiers=(),
         refused=tuple(refused(reason) for reason in reasons),
-        n_unlisted=0,
         verdict=FrontierVerdict.ALL_REFUSED,
         n_named=0,
     )

@@ -122,14 +122,12 @@ class FrontierReport:
     Attributes:
         frontiers: Where to go, best first.
         refused: Where not to go, longest first.
-        n_unlisted: Borders so short that they are nothing but noise.
         ways: Between those that were weighed against each other; they hold while the map does.
         n_named: The highest number given to a frontier so far; the next new one gets one more.
     """
 
     frontiers: tuple[Frontier, ...]
     refused: tuple[RefusedFrontier, ...]
-    n_unlisted: int
     verdict: FrontierVerdict
     n_named: int
     ways: WaysBetween | None = None

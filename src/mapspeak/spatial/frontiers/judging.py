@@ -56,7 +56,6 @@ def find_frontiers(
         distances = distances_from(grid, position, radius_m=radius_m)
     borders, n_short = find_borders(grid, least_length_m=radius_m)
     frontiers, refused = _judge(distances, borders, looked_from)
-    n_unlisted = n_short + len(borders) - len(frontiers) - len(refused)
     ranked, ways = rank(distances, merge_by_place(frontiers))
     return FrontierReport(
         frontiers=tuple(
@@ -64,8 +63,7 @@ def find_frontiers(
             for number, frontier in enumerate(ranked, start=1)
         ),
         refused=tuple(sorted(refused, key=lambda border: -border.length_m)),
-        n_unlisted=n_unlisted,
-        verdict=_verdict(distances, ranked, is_refused=bool(refused or n_unlisted)),
+        verdict=_verdict(distances, ranked, has_borders=bool(borders or n_short)),
         n_named=len(ranked),
         ways=ways,
     )
@@ -92,11 +90,11 @@ def rerank_frontiers(report: FrontierReport, distances: DistanceField) -> Fronti
 
 
 def _verdict(
-    distances: DistanceField, frontiers: Sequence[Frontier], *, is_refused: bool
+    distances: DistanceField, frontiers: Sequence[Frontier], *, has_borders: bool
 ) -> FrontierVerdict:
     if frontiers:
         return FrontierVerdict.SOME_LEFT
-    if is_refused:
+    if has_borders:
         is_shut_in = not distances.reachable.any()
         return FrontierVerdict.NONE_REACHABLE if is_shut_in else FrontierVerdict.ALL_REFUSED
     return FrontierVerdict.NONE_LEFT if distances.grid.free.any() else FrontierVerdict.NOTHING_KNOWN

@@ -208,7 +208,10 @@ def _extent_of_corners(
 
 def _corner_points(grid: OccupancyGrid, rows: IntArray, cols: IntArray) -> FloatArray:
     """Return the corners of cells that lie towards the grid's origin."""
-    return grid.points_at(rows - 0.5, cols - 0.5)
+    # Half a cell off their centres: exact to the last digit, by which pictures are rounded.
+    zero = np.array([0])
+    half_cell = grid.points_at(zero, zero) - np.array([grid.origin.x, grid.origin.y])
+    return np.asarray(grid.points_at(rows, cols) - half_cell)
 
 
 def _extent_of_points(points: FloatArray, up_rad: float) -> Extent:
