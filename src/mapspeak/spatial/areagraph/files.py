@@ -42,7 +42,9 @@ PolygonPositions = Annotated[list[RingPositions], Field(min_length=1)]
 PositionOf = Callable[[Point], tuple[float, float]]
 
 
-class _AreaRecord(BaseModel):
+class AreaRecord(BaseModel):
+    """What a file holds of an area."""
+
     id: str
     label: int
     kind: RoomClass
@@ -95,7 +97,7 @@ class _Document(BaseModel):
     format: Literal["mapspeak area graph"]
     version: Literal[1]
     name: str
-    areas: list[_AreaRecord]
+    areas: list[AreaRecord]
     passages: list[_PassageRecord]
 
 
