@@ -58,7 +58,7 @@ def test_a_turn_of_the_lidar_was_made_where_slam_took_the_robot_to_be_then(
     warehouse: World,
 ) -> None:
     simulation = Simulation(warehouse, seed=0)
-    simulation.set_velocity(BodyVelocity(0.5, 0.0))
+    simulation.start_goal(Pose(3.0, 0.0))
     for _ in range(8):
         simulation.step()
     at_scan = simulation.pose_in_map
@@ -78,8 +78,8 @@ def test_the_map_is_the_same_value_until_slam_has_changed_it(warehouse: World) -
 
     step_for(simulation, 3.0)
     assert simulation.map() is first
-    simulation.set_velocity(BodyVelocity(0.8, 0.0))
-    step_for(simulation, 1.0)
+    simulation.start_goal(Pose(3.0, 0.0))
+    step_for(simulation, 2.0)
 
     assert simulation.map() is not first
 
@@ -156,30 +156,6 @@ def test_an_unknown_drive_is_refused(warehouse: World, goal_id: int) -> None:
         simulation.goal_status(goal_id)
     with pytest.raises(GoalError):
         simulation.cancel_goal(goal_id)
-
-
-def test_a_velocity_by_hand_lasts_half_a_second_and_ends_the_drive(warehouse: World) -> None:
-    simulation = Simulation(warehouse, seed=0)
-    goal_id = simulation.start_goal(Pose(5.0, 3.0))
-
-    simulation.set_velocity(BodyVelocity(0.0, 1.0))
-    step_for(simulation, 0.5)
-    assert simulation.velocity.turn_radps == pytest.approx(1.0)
-    step_for(simulation, 1.0)
-
-    assert simulation.velocity == BodyVelocity(0.0, 0.0)
-    assert simulation.goal_status(goal_id).state is GoalState.CANCELLED
-
-
-def test_driving_by_hand_into_a_wall_is_a_collision_that_only_truth_knows(
-    warehouse: World,
-) -> None:
-    simulation = Simulation(warehouse, seed=0)
-    for _ in range(20):
-        simulation.set_velocity(BodyVelocity(-1.0, 0.0))
-        step_for(simulation, 0.25)
-
-    assert simulation.truth.n_collisions == 1
 
 
 def test_the_camera_looks_ahead_and_the_simulated_detector_reports_it(warehouse: World) -> None:

@@ -1,11 +1,10 @@
 """A world with one robot, stepped by hand: what its robot knows, and apart from it the truth.
 
-Each step is one tick of 0.05 s of robot time: navigation or teleoperation commands a velocity, the
-body moves, the wheels report, and at every second tick the LiDAR measures and SLAM learns.
+Each step is one tick of 0.05 s of robot time: navigation commands a velocity, the body moves, the
+wheels report, and at every second tick the LiDAR measures and SLAM learns.
 """
 
 import json
-import math
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +34,6 @@ TICK_S = 0.05
 _TICKS_PER_SCAN = 2
 _DETECTOR_SIZE_PX = (320, 240)
 """The detector judges by shares of the picture; half its size is as good and four times quicker."""
-_TELEOPERATION_TIMEOUT_S = 0.5
 
 
 class Simulation:
@@ -77,8 +75,6 @@ class Simulation:
         self._navigator = Navigator()
         self._ended: dict[int, GoalStatus] = {}
         self._goal_id = 0
-        self._teleoperation = STANDING
-        self._teleoperated_until_s = -math.inf
         self.truth = Truth(world, self._body, self._mapper)
         self._measure()
 
@@ -151,9 +147,9 @@ class Simulation:
     def start_goal(self, goal: Pose) -> int:
         """Send the robot to a pose in the map and return the drive's id; an earlier drive ends."""
         self._navigator.give_up(GoalState.PREEMPTED, "A newer goal replaced it.")
-        self._keep_status()
+        if self._goal_id > 0:
+            self._ended[self._goal_id] = self._navigator.status
         self._goal_id += 1
-        self._teleoperated_until_s = -math.inf
         self._navigator.start(goal)
         return self._goal_id
 
@@ -183,17 +179,7 @@ class Simulation:
 
     def stop(self) -> None:
         """End every drive and stop the robot."""
-        self._teleoperated_until_s = -math.inf
         self._navigator.give_up(GoalState.CANCELLED, "The robot was stopped.")
-
-    def set_velocity(self, velocity: BodyVelocity) -> None:
-        """Drive by hand for half a second at most; a drive under way ends.
-
-        Nothing but the bumper protects the robot meanwhile, as on a real one.
-        """
-        self._navigator.give_up(GoalState.CANCELLED, "The robot is driven by hand.")
-        self._teleoperation = velocity
-        self._teleoperated_until_s = self.time_s + _TELEOPERATION_TIMEOUT_S
 
     # --- inside ---
 
@@ -202,34 +188,26 @@ class Simulation:
         return PinholeCamera(self._world)
 
     def _command(self) -> BodyVelocity:
-        if self.time_s < self._teleoperated_until_s:
-            return self._teleoperation
         if not self._navigator.is_driving:
             return STANDING
-        return self._navigator.steer(self._senses())
-
-    @property
-    def _now_from_scan(self) -> Pose:
-        return self._odometry.odom_from_base.inverse() @ self._odom_at_scan
-
-    def _senses(self) -> Senses:
-        return Senses(
+        senses = Senses(
             now_s=self.time_s,
             pose=self.pose_in_map,
             speed_mps=self._body.velocity.speed_mps,
             obstacles=Obstacles.seen_from(self._points_in_base, self._now_from_scan),
             map=self._mapper.planning_map or self.map(),
         )
+        return self._navigator.steer(senses)
+
+    @property
+    def _now_from_scan(self) -> Pose:
+        return self._odometry.odom_from_base.inverse() @ self._odom_at_scan
 
     def _measure(self) -> None:
         self._scan = self._lidar.scan(self._body.world_from_base, stamp_s=self.time_s)
         self._points_in_base = self._scan.points_in_base
         self._odom_at_scan = self._odometry.odom_from_base
         self._mapper.add_scan(self._scan)
-
-    def _keep_status(self) -> None:
-        if self._goal_id > 0:
-            self._ended[self._goal_id] = self._navigator.status
 
 
 STATE_PERIOD_S = 0.2
