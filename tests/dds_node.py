@@ -30,8 +30,7 @@ from mapspeak.links.dds.endpoints import (
     reply_topic,
     request_topic,
 )
-from mapspeak.links.dds.network import DdsNetwork
-from mapspeak.links.dds.participant import DdsParticipant
+from mapspeak.links.dds.participant import DdsNetwork, DdsParticipant
 from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
 from mapspeak.links.endpoints import Sample
 from mapspeak.ros.definitions.typestore import hash_type

@@ -4,6 +4,6 @@ Needs the optional packages of mapspeak[dds].
 """
 
 from mapspeak.links.dds.connection import DdsConnection, open_dds_connection, open_dds_robot
-from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.dds.participant import DdsNetwork
 
 __all__ = ["DdsConnection", "DdsNetwork", "open_dds_connection", "open_dds_robot"]

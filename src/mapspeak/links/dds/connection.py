@@ -21,8 +21,7 @@ from mapspeak.links.dds.endpoints import (
     reply_topic,
     request_topic,
 )
-from mapspeak.links.dds.network import DdsNetwork
-from mapspeak.links.dds.participant import DdsParticipant
+from mapspeak.links.dds.participant import DdsNetwork, DdsParticipant
 from mapspeak.links.dds.services import DdsService
 from mapspeak.links.dds.types import HUMBLE, Types
 from mapspeak.links.endpoints import (

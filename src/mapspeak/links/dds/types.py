@@ -1,7 +1,7 @@
 """What types look like over DDS: described by the robot, or known to us by their hash."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -42,6 +42,7 @@ _ONE, _ARRAY, _BOUNDED, _SEQUENCE = range(4)
 _ROS_NAME = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 
 
+@cache
 def build_type_book(distro: str = "") -> TypeBook:
     """Return the types that come with mapspeak, and those that DDS needs.
 
@@ -99,7 +100,7 @@ class Types:
         self._distro = distro
         self._hashes: dict[str, str] = {}
         self._other_versions: set[str] = set()
-        self._book = _book_of(distro)
+        self._book = build_type_book(distro)
         self._codec = Codec(self._book)
 
     def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
@@ -143,7 +144,7 @@ class Types:
         """Take in that the robot runs Humble, whose nodes tell no hashes."""
         if self._distro != HUMBLE:
             self._distro = HUMBLE
-            self._use(_book_of(HUMBLE))
+            self._use(build_type_book(HUMBLE))
 
     def take_hash(self, type_name: str, type_hash: str) -> None:
         """Take in the hash of a type on the robot: of the versions we know, the one that has it.
@@ -156,7 +157,8 @@ class Types:
         if not type_hash or self._hashes.get(bare) == type_hash:
             return
         self._hashes[bare] = type_hash
-        books = [book for book in self._versions() if book.knows(bare)]
+        versions = (self._book, *map(build_type_book, DISTROS))
+        books = [book for book in versions if book.knows(bare)]
         fitting = next((book for book in books if _has_hash(book, bare, type_hash)), None)
         if fitting is None:
             self._other_versions |= {bare} if books else set()
@@ -165,10 +167,6 @@ class Types:
         if fitting is not self._book:
             texts = {name: fitting.texts[name] for name in fitting.within(bare)}
             self._use(TypeBook({**self._book.texts, **texts}))
-
-    def _versions(self) -> Iterator[TypeBook]:
-        yield self._book
-        yield from map(_book_of, DISTROS)
 
     def take_description(self, answer: Message) -> None:
         """Take in what a node says of a type."""
@@ -192,6 +190,3 @@ def _has_hash(book: TypeBook, name: str, type_hash: str) -> bool:
         return hash_type(book, name) == type_hash
     except LinkError:
         return False
-
-
-_book_of = cache(build_type_book)
