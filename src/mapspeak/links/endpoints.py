@@ -11,10 +11,10 @@ SERVICE_PART = re.compile(r"_(?:Request|Response)$")
 ACTION_PART = re.compile(r"_(?:SendGoal|GetResult)$|_FeedbackMessage$")
 
 
-def full_type(name: str, *, kind: str = "msg") -> str:
-    """Return a type as "package/kind/Type", however it was written."""
+def full_type(name: str) -> str:
+    """Return a type as "package/kind/Type", however it was written; of a message by default."""
     package, *middle, last = name.strip("/").split("/")
-    return f"{package}/{middle[0] if middle else kind}/{last}"
+    return f"{package}/{middle[0] if middle else 'msg'}/{last}"
 
 
 def whole_type(part_type: str) -> str:

@@ -147,7 +147,9 @@ class ActionWire:
             # Silence is no refusal: who sent the goal decides how long to wait.
             return
         if not self._send.tells_whom:
-            await self._wait_until_named(goal)
+            with anyio.move_on_after(SECOND_THOUGHT_S):
+                while not goal.is_accepted and goal.goal_id in self._goals:
+                    await self._is_named.wait()
         if goal.goal_id not in self._goals or goal.is_accepted:
             return
         if answer["accepted"]:
@@ -155,11 +157,6 @@ class ActionWire:
         else:
             del self._goals[goal.goal_id]
             goal.take_end(REFUSED)
-
-    async def _wait_until_named(self, goal: ActionGoal) -> None:
-        with anyio.move_on_after(SECOND_THOUGHT_S):
-            while not goal.is_accepted and goal.goal_id in self._goals:
-                await self._is_named.wait()
 
     def _tell_named(self) -> None:
         is_named, self._is_named = self._is_named, anyio.Event()
