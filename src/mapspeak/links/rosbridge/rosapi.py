@@ -39,7 +39,9 @@ class DefinitionKeeper:
         bare, kinds = bare_type(type_name), _kinds_of(type_name)
         if not self._known:
             self._known = known_definitions(dialect, distro=distro)
-        if not self._find(self._told, bare, kinds) and self._is_worth_asking(bare, kinds):
+        # What the robot did not say when it was asked, and we know ourselves, is not asked again.
+        is_answered = bare in self._not_told and self._find(self._known, bare, kinds)
+        if not self._find(self._told, bare, kinds) and not is_answered:
             await self._ask_graph()
             if dialect is Dialect.ROS1 and not self._find(self._told, bare, kinds):
                 await self._ask_details(bare, kinds)
@@ -48,10 +50,6 @@ class DefinitionKeeper:
         book = TypeBook({**self._known, **self._told})
         within = [each for name in names for each in book.within(name)]
         return {each: book.texts[each] for each in dict.fromkeys(within)}
-
-    def _is_worth_asking(self, bare: str, kinds: tuple[str, ...]) -> bool:
-        """Return False for what the robot did not say when it was asked, and we know ourselves."""
-        return bare not in self._not_told or not self._find(self._known, bare, kinds)
 
     def _find(self, texts: Mapping[str, str], bare: str, kinds: tuple[str, ...]) -> tuple[str, ...]:
         service, action = name_parts(bare)
@@ -155,8 +153,7 @@ class Rosapi(RosLink[RosbridgeTopicRequest]):
 
     async def fetch_topics(self) -> Mapping[str, str]:
         """Return the type of each topic."""
-        listed = await self._list_topics()
-        return {topic: bare_type(name) for topic, name in listed.items()}
+        return {topic: bare_type(name) for topic, name in (await self._list_topics()).items()}
 
     async def _list_topics(self) -> dict[str, str]:
         """Return the type of each topic, as rosapi writes it."""

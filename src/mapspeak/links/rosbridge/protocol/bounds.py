@@ -196,12 +196,9 @@ class FragmentStore:
         if len(message.pieces) == n_pieces:
             del self._unfinished[key]
             return b"".join(message.pieces[index] for index in range(n_pieces))
-        self._forget_what_is_too_much()
-        return None
-
-    def _forget_what_is_too_much(self) -> None:
         while len(self._unfinished) > MAX_UNFINISHED or self.n_bytes > self._max_bytes:
             self._unfinished.popitem(last=False)
+        return None
 
 
 def _read_piece(operation: dict[str, Any]) -> tuple[int, int, bytes]:
