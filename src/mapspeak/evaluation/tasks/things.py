@@ -20,7 +20,7 @@ from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point
 from mapspeak.places.standing import point_ahead
 from mapspeak.simulator import WorldObject
-from mapspeak.spatial.visibility import cells_on_line
+from mapspeak.spatial.visibility import mean_on_line
 
 # --- things by name, or by what they are for -----------------------------------------------------
 
@@ -205,7 +205,9 @@ def _is_roomy(site: GroundTruth, point: Point) -> bool:
 
 def _is_open(site: GroundTruth, one: Point, other: Point) -> bool:
     """Return True where the robot could drive straight from one point to the other."""
-    return bool(site.drivable[cells_on_line(site.grid, one, other)].all())
+    ends = site.grid.fractional_cells_at(np.array([[one.x, one.y], [other.x, other.y]]))
+    cost = np.where(site.drivable, 0.0, np.inf)
+    return math.isfinite(mean_on_line(cost, ends[0], ends[1]))
 
 
 RELATION_TASKS = (
