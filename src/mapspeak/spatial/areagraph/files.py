@@ -61,6 +61,7 @@ class AreaRecord(BaseModel):
     polygons: list[PolygonPositions]
 
     def to_area(self) -> Area:
+        """Return the area that the polygon tells of."""
         region = Region(
             id=self.id,
             index=self.label,
