@@ -7,7 +7,7 @@ import pytest
 
 from guarding import corners
 from mapspeak.geometry import Point, Pose
-from mapspeak.safety.detours import STRAY_M, plan_legs
+from mapspeak.safety.planning import STRAY_M, plan_legs
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import find_path
 from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea

@@ -14,7 +14,7 @@ from mapspeak.places.recall.notices import (
 )
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.places.ways import find_way
-from mapspeak.safety.detours import plan_legs
+from mapspeak.safety.planning import plan_legs
 from mapspeak.worldmodel.revision import MapRevision
 
 

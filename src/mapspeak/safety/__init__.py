@@ -30,7 +30,7 @@ from mapspeak.safety.deciding import (
     Situation,
     decide,
 )
-from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit
+from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit, Surveyor
 from mapspeak.safety.policy import (
     Approval,
     AreaRule,
@@ -43,7 +43,6 @@ from mapspeak.safety.policy import (
 )
 from mapspeak.safety.policyfile import load_policy
 from mapspeak.safety.robot import GuardedRobot
-from mapspeak.safety.surveying import Surveyor
 from mapspeak.safety.velocities import HandDriving, publishing_for, zero_velocity_of
 
 __all__ = [

@@ -23,12 +23,9 @@ from mapspeak.robot import (
 )
 from mapspeak.safety.audit import NOBODY, current_caller
 from mapspeak.safety.commands import DriveCommand, say_command
-from mapspeak.safety.detours import GuardedDrive
-from mapspeak.safety.guard import Guard, Permit
-from mapspeak.safety.holding import HoldKeeper, StandingCheck
-from mapspeak.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
-from mapspeak.safety.planning import Plan, Planner
-from mapspeak.safety.surveying import Surveyor
+from mapspeak.safety.guard import Guard, Permit, Surveyor
+from mapspeak.safety.monitor import GoalMonitor, HoldKeeper, KeepOutMonitor, Mover, StandingCheck
+from mapspeak.safety.planning import GuardedDrive, Plan, Planner
 from mapspeak.safety.velocities import HandDriving
 from mapspeak.spatial import OccupancyGrid
 

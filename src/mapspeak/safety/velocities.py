@@ -13,9 +13,9 @@ from mapspeak.errors import LinkError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Robot
 from mapspeak.safety.deciding import Refused, find_speeds, refuse
+from mapspeak.safety.guard import Surveyor
 from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
 from mapspeak.safety.planning import Planner
-from mapspeak.safety.surveying import Surveyor
 
 LEAST_S = 0.5
 """A single message is taken to move the robot for so long: drivers wait about that for the next."""
