@@ -24,7 +24,7 @@ from benchmarks.exploration import build_worlds, choose_start
 from benchmarks.figure import Figure
 from benchmarks.rooms import find_labelled_maps, list_labelled_maps
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory.alignment.keeping import MapComparison, MapRelation, compare_maps
+from mapspeak.memory.alignment.comparing import MapComparison, MapRelation, compare_maps
 from mapspeak.memory.alignment.surfaces import MapSurfaces, placed
 from mapspeak.robot import GoalState
 from mapspeak.server.text.findings import say_comparison

@@ -9,7 +9,7 @@ from mcp.client import Client
 from mcp.client.session import ElicitationFnT
 from mcp_types import CallToolResult, ImageContent, TextContent
 
-from mapspeak.memory import SemanticMapStore
+from mapspeak.memory import MemoryStore, SemanticMapStore
 from mapspeak.robot import Robot
 from mapspeak.safety import Guard
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
@@ -33,9 +33,11 @@ async def connect(
     on_question: ElicitationFnT | None = None,
     representation: Representation = Representation.PICTURE_TABLE,
     call_log: CallLog | None = None,
+    memory: MemoryStore | None = None,
 ) -> AsyncGenerator[Client]:
     """Gives a client of a server over that robot, with its memory in that folder."""
-    memory = SemanticMapStore(folder / "semantic_map.yaml", map_id=robot.description.map_name)
+    map_name = robot.description.map_name
+    memory = memory or SemanticMapStore(folder / "semantic_map.yaml", map_id=map_name)
     session = Session(robot, memory, lease_s=60.0, guard=guard, find_model=lambda: None)
     server = build_server(
         session,

@@ -27,6 +27,7 @@ __all__ = [
     "DrawnScore",
     "draw_worlds",
     "drawn_figures",
+    "number_spaces",
     "score_world",
     "ship_worlds",
     "show_worlds",
@@ -105,7 +106,7 @@ def show_worlds() -> None:
 
 def score_world(world: World, grid: OccupancyGrid) -> DrawnScore:
     """Divide a map of a building, in the frame of the robot's map, and compare it with truth."""
-    truth, classes = _number_spaces(world, grid)
+    truth, classes = number_spaces(world, grid)
     rooms = find_rooms(grid)
     overlap = find_overlap(rooms.labels.astype(np.intp), truth, grid.free & (truth > 0))
     agreement = find_agreement(overlap)
@@ -127,7 +128,7 @@ def score_world(world: World, grid: OccupancyGrid) -> DrawnScore:
     )
 
 
-def _number_spaces(world: World, grid: OccupancyGrid) -> tuple[Numbers, list[RoomClass]]:
+def number_spaces(world: World, grid: OccupancyGrid) -> tuple[Numbers, list[RoomClass]]:
     """Return each cell the number of its space from 1, 0 outside; and what the spaces are."""
     others = [space for space in world.rooms if space.room_class is not RoomClass.CORRIDOR]
     corridors = [space for space in world.rooms if space.room_class is RoomClass.CORRIDOR]
@@ -170,7 +171,11 @@ def _is_smallest_right(
         for number, each in enumerate(classes, start=1)
         if each is RoomClass.ROOM
     )[1]
-    found = [region for region in rooms.regions if region.room_class is RoomClass.ROOM]
+    found = [
+        region
+        for region in rooms.regions
+        if region.room_class is RoomClass.ROOM and not rooms.find_doubtful_door(region)
+    ]
     by_floor = min(found, key=lambda region: region.floor_area_m2, default=None)
     by_free = min(found, key=lambda region: region.free_area_m2, default=None)
     return all(each is not None and (each.index, right) in pairs for each in (by_floor, by_free))

@@ -2,8 +2,8 @@
 
 MAPS holds folders of maps; each map is a folder with `map.png` (0 occupied, 205 unknown, 254
 free), `rooms.png` (16-bit region numbers, 0 for none) and `meta.json` (the resolution; per region
-its number, and its class if known: "room" or "hallway"). Only cells that are free in the map and
-numbered by people are counted.
+its number, and if known whether it is a "room" or a "hallway", as type or as class). Only cells
+that are free in the map and numbered by people are counted.
 """
 
 import json
@@ -51,7 +51,7 @@ PUBLISHED = {
         "Voronoi": 0.759,
     },
     "bormann_furnished": {"DuDe": 0.777, "ROSE2": 0.771, "Voronoi": 0.693},
-    "rose2_full": {"ROSE2": 0.736},
+    "rose2_full": {"ROSE2": 0.817},
     "rose2_partial_fr79": {"ROSE2": 0.862},
 }
 """F1 at 0.5 of published methods on the same maps with the same score; none takes part here.
@@ -115,8 +115,10 @@ class Score:
         n_found: Regions found.
         n_true: Regions people drew.
         class_ratio: The share of agreeing regions with the right class.
-        hallways: True positives, false positives and misses among them, hallway as positive.
-        ranks_right: Which rooms by size, hallways left out, are the right ones.
+        hallways: Corridors found that are hallways people drew, corridors that are none, and
+            hallways that no corridor agrees with.
+        ranks_right: Which rooms by size are the right ones; hallways, and regions that may be
+            parts of others, left out.
         time_ms: CPU time.
     """
 
@@ -141,7 +143,7 @@ def score_map(folder: Path) -> Score:
     truth = np.asarray(picture, np.intp)[::-1]
     overlap = find_overlap(rooms.labels.astype(np.intp), truth, loaded.grid.free & (truth > 0))
     agreement = find_agreement(overlap)
-    classes = {room["id"]: room["class"] for room in meta["rooms"] if "class" in room}
+    classes = _read_classes(meta)
     pairs = [(int(i), int(j)) for i, j in np.argwhere(agreement >= 0.5)]
     return Score(
         group=folder.parent.name,
@@ -151,10 +153,16 @@ def score_map(folder: Path) -> Score:
         n_found=int((overlap[1:].sum(axis=1) > 0).sum()),
         n_true=int((overlap[:, 1:].sum(axis=0) > 0).sum()),
         class_ratio=_class_ratio(rooms, classes, pairs) if classes else None,
-        hallways=_hallways(rooms, classes, pairs) if classes else None,
-        ranks_right=_ranks_right(rooms, classes, overlap, agreement) if classes else None,
+        hallways=_hallways(rooms, classes, overlap, pairs) if classes else None,
+        ranks_right=_ranks_right(rooms, classes, truth, agreement) if classes else None,
         time_ms=time_ms,
     )
+
+
+def _read_classes(meta: dict[str, Any]) -> dict[int, str]:
+    """Return "room" or "hallway" for each number that has a class."""
+    named = {room["id"]: room.get("type", room.get("class")) for room in meta.get("rooms", ())}
+    return {number: each for number, each in named.items() if each in ("room", "hallway")}
 
 
 def find_overlap(found: Numbers, truth: Numbers, counted: NDArray[np.bool_]) -> Numbers:
@@ -185,30 +193,31 @@ def _is_hallway(rooms: RoomMap, index: int) -> bool:
 def _class_ratio(
     rooms: RoomMap, classes: dict[int, str], pairs: list[tuple[int, int]]
 ) -> float | None:
-    right = [_is_hallway(rooms, i) == (classes[j] == "hallway") for i, j in pairs]
+    known = [(i, classes[j]) for i, j in pairs if j in classes]
+    right = [_is_hallway(rooms, i) == (each == "hallway") for i, each in known]
     return statistics.mean(right) if right else None
 
 
 def _hallways(
-    rooms: RoomMap, classes: dict[int, str], pairs: list[tuple[int, int]]
+    rooms: RoomMap, classes: dict[int, str], overlap: Numbers, pairs: list[tuple[int, int]]
 ) -> tuple[int, int, int]:
-    said = [(_is_hallway(rooms, i), classes[j] == "hallway") for i, j in pairs]
-    return (
-        sum(found and true for found, true in said),
-        sum(found and not true for found, true in said),
-        sum(true and not found for found, true in said),
-    )
+    drawn = np.flatnonzero(overlap.any(axis=0)).tolist()
+    n_true = sum(classes.get(number) == "hallway" for number in drawn)
+    found = [i for i in np.flatnonzero(overlap[:, 1:].any(axis=1)).tolist() if i > 0]
+    n_found = sum(_is_hallway(rooms, i) for i in found)
+    n_right = sum(_is_hallway(rooms, i) and classes.get(j) == "hallway" for i, j in pairs)
+    return n_right, n_found - n_right, n_true - n_right
 
 
 def _ranks_right(
-    rooms: RoomMap, classes: dict[int, str], overlap: Numbers, agreement: Ratios
+    rooms: RoomMap, classes: dict[int, str], truth: Numbers, agreement: Ratios
 ) -> dict[str, bool]:
     found = sorted(
-        (region.free_area_m2, region.index)
+        (region.floor_area_m2, region.index)
         for region in rooms.regions
-        if region.room_class is not RoomClass.CORRIDOR
+        if region.room_class is not RoomClass.CORRIDOR and not rooms.find_doubtful_door(region)
     )
-    areas = overlap.sum(axis=0)
+    areas = np.bincount(truth.ravel())
     true = sorted((int(areas[j]), j) for j, named in classes.items() if named == "room")
     return {
         name: len(found) > abs(rank) and bool(agreement[found[rank][1], true[rank][1]] >= 0.5)

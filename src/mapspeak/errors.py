@@ -31,6 +31,7 @@ class NextStep(StrEnum):
     DRIVE_ROUND = "drive_round"
     USE_OTHER_TOOLS = "use_other_tools"
     BEGIN_ROUTE = "begin_route"
+    ALIGN = "align"
 
 
 def say_cause(error: Exception) -> str:

@@ -18,8 +18,8 @@ from mapspeak.driving.episodewriter import EpisodeWriter, Keeping
 from mapspeak.driving.stops import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
-from mapspeak.memory.alignment.keeping import MapComparison, MapKeeper
+from mapspeak.memory import MemoryStore, PictureBook, SemanticMap
+from mapspeak.memory.alignment.framed import FramedMemory
 from mapspeak.memory.episodes.observation import (
     EpisodePage,
     EpisodeQuery,
@@ -63,14 +63,16 @@ class Session:
         robot: The port to the robot, behind the guard.
         pictures: Taken lately, by their ids.
         episodes: Every observation, as it was made.
-        keeper: The map that the memory belongs to.
+        memory: What is remembered, as it is on the robot's map.
+        keeper: Which frame of the memory the robot's map is in.
         recollector: Keeps what was made of the memory.
+        world: The map as it was looked at last; None before.
     """
 
     def __init__(
         self,
         robot: Robot,
-        memory: SemanticMapStore,
+        memory: MemoryStore,
         *,
         lease_s: float,
         guard: Guard | None = None,
@@ -85,7 +87,7 @@ class Session:
             self._surveyor = Surveyor(
                 guard.policy.areas,
                 wall_clock=guard.wall_clock,
-                read_events=self._recall_events,
+                read_events=self.recall_events,
                 # A clearance that somebody has set is kept to the millimetre.
                 leaves_pockets=not guard.policy.clearance_m,
             )
@@ -101,21 +103,21 @@ class Session:
                 )
         self.ros = ros
         self.robot: Robot = self._guarded or robot
-        self.memory = memory
+        name_robot, lock = lambda: robot.description.name, threading.RLock()
+        self.memory = FramedMemory(memory, name_robot=name_robot, lock=lock)
+        self.keeper = self.memory.keeper
         self.pictures = PictureBook()
         folder = memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
         wall_clock = None if guard is None else guard.wall_clock
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
-        self.keeper = MapKeeper(memory, episodes)
         self._rank: VectorRank | None = None
         self._ranking = threading.Lock()
         self.recollector = Recollector(find_model, kept=folder / "vectors.npz")
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
-        self._world: WorldModel | None = None
-        self._looked_s = 0.0
-        self._learned_from = ""
+        self.world: WorldModel | None = None
+        self._looked_s, self._learned_from = 0.0, ""
         self._surveying = anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
@@ -158,24 +160,25 @@ class Session:
                     hint="Wait until SLAM or the map server has sent one, then look again.",
                 )
             stamped = await self.robot.fetch_pose()
-            memory = await self.compute(self.memory.read if needs_memory else self._recall)
+            recall = self._recall if needs_memory else self._recall_if_possible
+            memory = await self.compute(partial(recall, grid))
             revision, warnings = await self._survey(grid)
             if revision is not None and await self._learn(revision):
                 revision, warnings = await self._survey(grid)
-            self._world = WorldModel(
+            self.world = WorldModel(
                 grid,
                 stamped.pose,
                 replace(memory, warnings=(*memory.warnings, *warnings)),
                 radius_m=self.robot.description.radius_m,
                 looked_from=self.drives.frontiers_tried,
-                previous=self._world,
+                previous=self.world,
                 revision=revision,
                 recollector=self.recollector,
                 pose_doubt=stamped.find_doubt(self.robot.now_s),
                 is_radius_assumed=self.robot.description.is_radius_assumed,
             )
             self._looked_s = self.robot.now_s
-            return self._world
+            return self.world
 
     async def find_room_id(self, point: Point) -> str | None:
         """Return the room a point lies in, on the map that was looked at last.
@@ -185,7 +188,7 @@ class Session:
         Raises:
             LinkError: The robot has no map yet.
         """
-        world = self._world
+        world = self.world
         if world is None or self.robot.now_s < self._looked_s:
             # A simulation that was begun anew may show another world.
             with anyio.move_on_after(MAP_S) as waiting:
@@ -203,17 +206,19 @@ class Session:
             room_id = await self.find_room_id(picture.pose.point)
         except (LinkError, MapError):
             room_id = None
-        return await self.compute(
-            lambda: self.episodes.keep(
+
+        def keep() -> Keeping:
+            return self.episodes.keep(
                 ObservationKind.PICTURE,
                 picture=picture.data,
                 pose=picture.pose,
                 stamp_s=picture.stamp_s,
                 labels=labels,
                 room_id=room_id,
-                map_id=self.memory.map_id,
+                name_map=self.memory.name_map,
             )
-        )
+
+        return await self.compute(keep)
 
     def find_wall_time(self) -> datetime | None:
         """Return the time by the calendar; None where the operator's clock is not known."""
@@ -221,7 +226,7 @@ class Session:
 
     def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
         """Return the observations that pass a query, compared by meaning where that is possible."""
-        find = self.episodes.store.find
+        query, find = replace(query, placings=self.memory.place_maps()), self.episodes.store.find
         compares_words = query.words or isinstance(query.near, EpisodeQuery)
         embedder = self.recollector.embedder if compares_words else None
         if embedder is None:
@@ -232,6 +237,10 @@ class Session:
                 self._rank = VectorRank(self.episodes.store.database, embedder)
             return find(query, rank=self._rank)
 
+    def find_reported(self, query: EpisodeQuery) -> EpisodePage:
+        """Return the observations that pass a query, compared by words alone."""
+        return self.episodes.store.find(replace(query, placings=self.memory.place_maps()))
+
     async def warm_memory(self) -> None:
         """Load what the first question would wait for: the model, the index of the memory.
 
@@ -240,8 +249,6 @@ class Session:
         # Whoever ends the server does not wait for it.
         in_thread = partial(anyio.to_thread.run_sync, abandon_on_cancel=True)
         with suppress(MapspeakError):
-            if self.episodes.is_open:
-                await in_thread(self.keeper.finish_move)
             await in_thread(lambda: self.recollector.warm(self.memory.read()))
             world = await self.fetch_world_model()
             # All of it in the thread: what is remembered is joined with the map there.
@@ -254,27 +261,14 @@ class Session:
         if self.episodes.is_open:
             await self.compute(self.recollector.keep)
 
-    async def keep_map(self) -> MapComparison | None:
-        """Keep the map with the memory after a write; return how it lies on the one before.
-
-        Raises:
-            SemanticMapError: The map cannot be kept or compared.
-        """
+    async def meet_map(self) -> None:
+        """Find out which frame of the memory the robot's map is in, before a write."""
         try:
             grid = await self.robot.fetch_map()
         except LinkError:
-            return None
-        if not grid.cells.size:
-            return None
-        return await self.compute(lambda: self.keeper.keep(grid))
-
-    async def compare_map(self, grid: OccupancyGrid) -> MapComparison | None:
-        """Return how a map lies on the one that the memory belongs to; None where that has none.
-
-        Raises:
-            SemanticMapError: The maps cannot be compared.
-        """
-        return await self.compute(lambda: self.keeper.compare(grid))
+            return
+        if grid.cells.size:
+            await self.compute(partial(self._meet, grid))
 
     async def find_goal(
         self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
@@ -316,17 +310,29 @@ class Session:
             logger.warning("What the drive tells of doors is not remembered: %s", error)
             return False
 
-    def _recall_events(self) -> tuple[Event, ...]:
+    def recall_events(self) -> tuple[Event, ...]:
         """Return the events that are remembered; of a broken file those that were read before."""
         try:
             return self.memory.read_events()
         except SemanticMapError:
             return ()
 
-    def _recall(self) -> SemanticMap:
+    def _recall(self, grid: OccupancyGrid) -> SemanticMap:
+        """Return what is remembered, as it is on a map."""
+        self._meet(grid)
+        return self.memory.read()
+
+    def _meet(self, grid: OccupancyGrid) -> None:
+        """Let the memory see the robot's map; of one begun anew no older picture can be told."""
+        n_before = self.keeper.n_maps
+        self.memory.meet(grid)
+        if self.keeper.n_maps != n_before:
+            self.pictures.forget()
+
+    def _recall_if_possible(self, grid: OccupancyGrid) -> SemanticMap:
         """Return what is remembered; a broken file costs the memory, not the map."""
         try:
-            return self.memory.read()
+            return self._recall(grid)
         except SemanticMapError as error:
             return SemanticMap(warnings=(str(error),))
 

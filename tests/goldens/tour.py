@@ -41,6 +41,14 @@ ODD_PLACES = (
     "0, 0",
     "0,0,90",
 )
+SUPERLATIVES = (
+    "smallest room",
+    "the second-largest room",
+    "farthest door",
+    "between the two nearest doors",
+    "R1 looking back through its door",
+    "all rooms",
+)
 PHRASES = (
     "left of {0}",
     "between {0} and {1}",
@@ -120,6 +128,9 @@ async def ask_the_map(play: Transcript, seen: str) -> None:
     for phrase in PHRASES:
         for pair in itertools.pairwise(places[:4]):
             await play.call("check_goal", place=phrase.format(*pair))
+    for phrase in SUPERLATIVES:
+        await play.call("check_goal", place=phrase)
+    await play.call("measure", places=["all rooms", "the two nearest doors"])
     await play.call("measure")
     await play.call("measure", places=places[:8], start="robot")
     for pair in itertools.combinations(places[:6], 2):
@@ -191,6 +202,7 @@ async def close_and_open(play: Transcript, seen: str) -> None:
     await play.call("note_event", text="Visitors come", place="gate 4", begins="in 2h")
     await play.call("note_event", text="", place="nowhere")
     await play.call("look_at_map")
+    await play.call("what_is_blocked")
     for place in places:
         await play.call("check_goal", place=place)
         await play.call("navigate_to", place=place, wait_s=25)

@@ -6,7 +6,7 @@ import pytest
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMapStore, Waypoint
-from mapspeak.memory.events import Effect, Event, current_events, find_place_ids
+from mapspeak.memory.events import Effect, Event, Every, current_events, find_place_ids
 
 NOON = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
 TWO = datetime(2026, 11, 22, 14, 0, tzinfo=UTC)
@@ -153,14 +153,6 @@ def test_a_misspelt_list_of_events_is_said(store: SemanticMapStore) -> None:
     assert "'events' would be" in store.read().warnings[0]
 
 
-def test_events_of_another_map_are_none_of_ours(store: SemanticMapStore) -> None:
-    store.write_event(CLOSED)
-
-    assert SemanticMapStore(store.path, map_id="b2").read_events() == ()
-    with pytest.raises(SemanticMapError, match='belongs to the map "b1"'):
-        SemanticMapStore(store.path, map_id="b2").write_event(BROKEN)
-
-
 def test_a_file_broken_by_hand_keeps_its_last_events(store: SemanticMapStore) -> None:
     (written,) = (store.write_event(CLOSED),)
     store.path.write_text("events: [")
@@ -288,3 +280,65 @@ def test_an_id_of_an_event_looks_like_one(event_id: str) -> None:
 def test_ids_are_found_in_words() -> None:
     assert find_place_ids("corridor c1, behind D12 and D12") == ("C1", "D12")
     assert find_place_ids("the coffee machine of room 3") == ()
+
+
+# --- what comes again ------------------------------------------------------------------------
+
+MONDAY = datetime(2026, 11, 23, 8, 0, tzinfo=timezone(timedelta(hours=1)))
+
+
+def cleaning(every: Every, *, hours: float = 2.0) -> Event:
+    until = MONDAY + timedelta(hours=hours)
+    return Event(
+        text="cleaning", effect=Effect.CLOSED, place="C1", begins=MONDAY, until=until, every=every
+    )
+
+
+@pytest.mark.parametrize(
+    ("every", "days"),
+    [
+        (Every.ONCE, [0]),
+        (Every.DAY, [0, 1, 2, 3, 4, 5, 6, 7]),
+        (Every.WORKDAY, [0, 1, 2, 3, 4, 7]),
+        (Every.WEEK, [0, 7]),
+    ],
+)
+def test_an_event_comes_again_on_its_days_at_its_hours(every: Every, days: list[int]) -> None:
+    event = cleaning(every)
+    for day in range(-2, 8):
+        at_eight = MONDAY + timedelta(days=day)
+        is_day = day in days
+        assert not event.is_current(at_eight - timedelta(seconds=1))
+        assert event.is_current(at_eight) == is_day
+        assert event.is_current(at_eight + timedelta(minutes=119)) == is_day
+        assert not event.is_current(at_eight + timedelta(hours=2))
+
+
+def test_an_event_over_midnight_lasts_into_the_next_day() -> None:
+    event = cleaning(Every.DAY, hours=20.0)
+
+    assert event.is_current(MONDAY + timedelta(days=3, hours=19))
+    assert not event.is_current(MONDAY + timedelta(days=3, hours=21))
+
+
+def test_what_comes_again_is_told_with_its_next_time_and_is_never_over() -> None:
+    event = cleaning(Every.WEEK)
+    thursday = MONDAY + timedelta(days=3)
+
+    assert not event.is_over(thursday)
+    assert event.find_time(thursday)[0] == MONDAY + timedelta(days=7)
+    assert "from 2026-11-30 08:00" in event.sentence(thursday)
+    assert "again every week" in event.sentence(thursday)
+
+
+def test_what_comes_again_is_kept_in_the_file(store: SemanticMapStore) -> None:
+    store.write_event(cleaning(Every.WORKDAY))
+
+    assert SemanticMapStore(store.path).read_events()[0].every is Every.WORKDAY
+    assert any("every: workday" in line for line in lines_of(store))
+
+
+@pytest.mark.parametrize("hours", [25.0, 200.0])
+def test_what_lasts_longer_than_until_it_comes_again_is_refused(hours: float) -> None:
+    with pytest.raises(SemanticMapError, match="comes again every day"):
+        cleaning(Every.DAY, hours=hours)

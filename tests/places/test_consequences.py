@@ -173,9 +173,10 @@ async def test_the_revision_stays_while_events_do() -> None:
 
 
 async def test_a_session_heeds_the_events_of_its_memory(tmp_path: Path) -> None:
-    store = SemanticMapStore(tmp_path / "places.yaml")
+    robot = FakeRobot(office())
+    store = SemanticMapStore(tmp_path / "places.yaml", map_id=robot.description.map_name)
     guard = make_guard(tmp_path, Policy(), clock=WallClock(NOW))
-    session = Session(FakeRobot(office()), store, lease_s=60.0, guard=guard)
+    session = Session(robot, store, lease_s=60.0, guard=guard)
     store.write_event(event(Effect.CLOSED))
 
     world = await session.fetch_world_model()

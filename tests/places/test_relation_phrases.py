@@ -6,17 +6,16 @@ import pytest
 from mapspeak.places.relations.grammar import (
     Away,
     Between,
-    Compass,
     Corner,
-    Kind,
     Middle,
-    Nearest,
-    Side,
+    Several,
+    Superlative,
     Towards,
     Turned,
     WallSide,
     parse_relation,
 )
+from mapspeak.places.relations.vocabulary import Compass, Kind, Order, Side
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "relations.md"
 
@@ -45,9 +44,25 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "relations.md"
         ("corner of R2 near D1", Corner(of="R2", near="D1")),
         ("along the northern wall of R3", WallSide(of="R3", compass=Compass.NORTH, is_along=True)),
         ("centre of R2", Middle("R2")),
-        ("nearest unexplored area", Nearest(Kind.FRONTIER)),
-        ("the closest door to W3", Nearest(Kind.DOOR, "W3")),
+        ("nearest unexplored area", Superlative(kind=Kind.FRONTIER)),
+        ("the closest door to W3", Superlative(kind=Kind.DOOR, to="W3")),
         ("left of W3, facing D1", Turned("left of W3", "D1")),
+        ("R2 looking back through D6", Turned("R2", "D6")),
+        ("R2, looking back through its door", Turned("R2", None)),
+        ("R2 facing its doorway", Turned("R2", None)),
+        (
+            "the second-largest room",
+            Superlative(kind=Kind.ROOM, order=Order.LARGEST, rank=2),
+        ),
+        ("furthest door from W3", Superlative(kind=Kind.DOOR, order=Order.FARTHEST, to="W3")),
+        ("the two nearest doors", Several(kind=Kind.DOOR, count=2)),
+        (
+            "3 largest rooms",
+            Several(kind=Kind.ROOM, order=Order.LARGEST, count=3),
+        ),
+        ("all of the rooms", Several(kind=Kind.ROOM)),
+        ("every door of C1", Several(kind=Kind.DOOR, at="C1")),
+        ("every remembered fire extinguisher", Several(label="fire extinguisher")),
     ],
 )
 def test_a_phrase_is_read_whatever_its_articles_case_and_underscores(

@@ -18,7 +18,7 @@ PAPER_TOOLS = {
     "write_semantic_data",
     "get_semantic_data",
 }
-MOST_BYTES = 12_000
+MOST_BYTES, MOST_BYTES_OF_ALL = 12_000, 40_000
 EVERYTHING = ("look", "places", "drive", "paper", "explore", "routes", "memory", "ros")
 
 
@@ -46,6 +46,31 @@ async def test_the_tool_list_is_short(tmp_path: Path) -> None:
         listed = await client.list_tools()
     sent = listed.model_dump_json(by_alias=True, exclude_none=True)
     assert len(sent) <= MOST_BYTES
+
+
+async def test_the_list_of_all_tools_is_short_too(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=EVERYTHING) as client:
+        listed = await client.list_tools()
+    sent = listed.model_dump_json(by_alias=True, exclude_none=True)
+    assert len(sent) <= MOST_BYTES_OF_ALL
+
+
+async def test_whoever_looks_for_a_thing_reads_first_which_tool_to_take(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=EVERYTHING) as client:
+        tools = (await client.list_tools()).tools
+    first = {tool.name: (tool.description or "").splitlines()[0] for tool in tools}
+    for name in ("search_for", "get_semantic_data", "recall_episodes"):
+        assert "find_place" in first[name]
+    assert "Take this first" in first["find_place"]
+
+
+async def test_turning_and_looking_around_are_there_by_default(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        names = {tool.name for tool in (await client.list_tools()).tools}
+        first, *_ = (client.instructions or "").splitlines()
+    assert names >= {"turn", "look_around", "stop_robot", "what_is_blocked"}
+    told = [first.index(word) for word in ("map", "camera", "rooms", "drives", "memory of places")]
+    assert told == sorted(told)
 
 
 async def test_read_only_leaves_out_what_moves_or_remembers_but_stopping_stays(

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import anyio
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -13,6 +14,7 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.agents.driver import read_map_picture, read_map_text
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
+from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S
 from served import MODES, connect, pictures_of, report_of, text_of
 
@@ -185,6 +187,21 @@ async def test_a_room_that_borders_on_the_unknown_is_said_to_be_not_all_seen(
         text = text_of(await client.call_tool("look_at_map", {}))
     sizes = {row.id: row.cells["floor m2"] for row in read_map_text(text).rows("Rooms")}
     assert [size.endswith("(not all seen)") for size in sizes.values()] == [False, True]
+
+
+async def test_a_bay_that_may_be_part_of_a_room_is_named_apart_from_the_smallest(
+    tmp_path: Path,
+) -> None:
+    cells = np.full((30, 40), 100, np.int8)
+    left, right, bay = np.s_[1:21, 1:25], np.s_[1:21, 26:39], np.s_[22:29, 4:12]
+    door, mouth = np.s_[8:13, 25], np.s_[21, 5:11]
+    for floor in (left, right, bay, door, mouth):
+        cells[floor] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.2)
+    async with connect(FakeRobot(grid, pose=Pose(1.5, 1.5)), tmp_path) as client:
+        text = text_of(await client.call_tool("look_at_map", {}))
+    assert "The smaller room is R2 (10.5 m2), the larger R1 (19.5 m2)." in text
+    assert "Unsure: R3 (3.3 m2, maybe part of R1: D2)." in text
 
 
 async def test_a_corridor_that_bends_has_one_size_in_the_table_and_where_it_is_described(

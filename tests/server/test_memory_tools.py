@@ -122,3 +122,19 @@ async def test_a_place_that_is_not_remembered_is_answered_with_those_that_are(
     assert "no places yet" in text_of(empty)
     assert other.is_error
     assert 'W1 "dock"' in text_of(other)
+
+
+async def test_many_places_are_read_page_by_page(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        for number in range(23):
+            await client.call_tool(
+                "write_semantic_data", {"name": f"spot {number}", "description": "x"}
+            )
+        first = report_of(await client.call_tool("get_semantic_data", {}))
+        rest = report_of(await client.call_tool("get_semantic_data", {"from_row": 20}))
+    assert len(first["waypoints"]) == 20
+    assert first["warnings"] == [
+        '3 left out, from_row=20 goes on: W21 "spot 20", W22 "spot 21", W23 "spot 22".'
+    ]
+    assert [each["name"] for each in rest["waypoints"]] == ["spot 20", "spot 21", "spot 22"]
+    assert (rest["warnings"], rest["n_places"]) == ([], 23)

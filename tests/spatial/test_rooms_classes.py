@@ -1,6 +1,8 @@
+import numpy as np
 import pytest
 
 from drawing import grid_from_text
+from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
 
 CELL_M = 0.25
@@ -100,3 +102,13 @@ def test_a_strip_is_a_corridor_also_where_it_is_a_dead_end(text: str) -> None:
 
     classes = [(region.room_class, len(region.door_ids)) for region in rooms.regions]
     assert sorted(classes) == [(RoomClass.CORRIDOR, 1), (RoomClass.ROOM, 1)]
+
+
+def test_a_slit_that_no_robot_can_stand_in_is_no_region() -> None:
+    cells = np.full((120, 204), 100, np.int8)
+    cells[10:110, 2:202] = 0
+    cells[4:8, 2:202] = 0
+
+    regions = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05)).regions
+
+    assert [region.id for region in regions] == ["R1"]

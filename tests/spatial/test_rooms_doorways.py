@@ -159,10 +159,11 @@ def test_every_free_cell_of_a_doorway_belongs_to_a_region() -> None:
     assert (labels[grid.free] > 0).all()
 
 
-def test_bays_that_no_wall_closes_off_are_no_rooms() -> None:
+def test_bays_that_no_wall_closes_off_are_no_sure_rooms() -> None:
     rooms = find_rooms(drawn(WITHOUT_STUBS))
 
     assert len(rooms.regions) < 4
+    assert rooms.find_doubtful_door(rooms.regions[-1])
 
 
 def test_doors_that_face_each_other_divide_no_corridor() -> None:

@@ -174,6 +174,26 @@ def test_a_region_that_merged_twice_points_to_the_last_one() -> None:
         assert third.region(region.id).id == only.id
 
 
+def test_an_id_does_not_move_on_to_what_has_only_a_rim_of_its_floor() -> None:
+    cells = row_of_rooms(3)
+    known = cells.copy()
+    known[:, 2 * ROOM_CELLS + 4 :] = -1
+    before = divide(known)
+    moved = cells.copy()
+    for wall, now in ((ROOM_CELLS, None), (2 * ROOM_CELLS, 2 * ROOM_CELLS - 16)):
+        moved[4:-4, wall : wall + 4] = 0
+        if now is not None:
+            moved[4:-4, now : now + 4] = 100
+            moved[30:48, now : now + 4] = 0
+
+    after = divide(moved, previous=before)
+
+    assert len(after.regions) == 2
+    assert id_at(after, 2.0) == id_at(before, 2.0)
+    assert id_at(after, 10.0) not in {region.id for region in before.regions}
+    assert heirs_of(after, id_at(before, 6.0)) == (id_at(after, 2.0),)
+
+
 def test_a_door_that_was_closed_is_remembered() -> None:
     before = divide(row_of_rooms(3))
     (door,) = before.doors_between(id_at(before, 2.0), id_at(before, 6.0))

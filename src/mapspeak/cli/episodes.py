@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mapspeak.cli.options import FILE, data_folder, usual_modes, wall_clock
+from mapspeak.cli.options import data_folder, usual_modes, wall_clock
 from mapspeak.errors import ConfigError
+from mapspeak.installation import say_install
 
 if TYPE_CHECKING:
-    from mapspeak.memory import SemanticMap, SemanticMapStore
+    from mapspeak.memory import MemoryStore, SemanticMap
     from mapspeak.memory.episodes.observation import EpisodeMatch, EpisodeQuery, Rank
     from mapspeak.memory.episodes.store import EpisodeStore
 
@@ -21,14 +22,15 @@ MEMORY_OPTION = click.option(
     "--memory",
     "--semantic-map",
     "semantic_map",
-    type=FILE,
-    help="The semantic map file; the one in the user's data folder, if there is but one.",
+    metavar="FILE|postgresql://...",
+    help="The semantic map file, or the database; the file in the user's data folder, if there is "
+    "but one.",
 )
 JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="As JSON.")
 
 
-def find_memory(given: Path | None) -> Path:
-    """Return the semantic map file.
+def find_memory(given: str | None) -> str:
+    """Return the semantic map file, or the address of the database.
 
     Raises:
         ConfigError: None is given, and the data folder has none or several.
@@ -37,28 +39,58 @@ def find_memory(given: Path | None) -> Path:
         return given
     found = sorted(data_folder().glob("*.yaml"))
     if len(found) == 1:
-        return found[0]
+        return str(found[0])
     names = ", ".join(map(str, found)) or f"none in {data_folder()}"
     raise ConfigError("It is not clear which memory.", hint=f"Name one: --memory; {names}.")
 
 
-def open_memory(given: Path | None) -> "SemanticMapStore":
-    """Open a semantic map file that is there.
+def open_memory(given: str | None) -> "MemoryStore":
+    """Open a memory that is there.
 
     Raises:
         ConfigError: It is not.
     """
-    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-
-    path = find_memory(given)
-    if not path.exists():
-        raise ConfigError(f"There is no file {path}.", hint="Name one with --memory.")
-    return SemanticMapStore(path)
+    name = find_memory(given)
+    if not is_database(name) and not Path(name).exists():
+        raise ConfigError(f"There is no file {name}.", hint="Name one with --memory.")
+    return open_store(name)
 
 
-def read_places(store: "SemanticMapStore") -> "SemanticMap":
+def open_store(name: str, *, map_id: str | None = None) -> "MemoryStore":
+    """Open a memory, which may have to be made yet.
+
+    Args:
+        name: A file, or the address of a PostgreSQL database.
+        map_id: The map that the robot is on.
+
+    Raises:
+        ConfigError: The packages for the database are missing.
+    """
+    if not is_database(name):
+        from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
+
+        return SemanticMapStore(Path(name), map_id=map_id)
+    try:
+        from mapspeak.memory.postgres import (  # noqa: PLC0415 - an extra, and heavy
+            PostgresStore,
+            shown_address,
+        )
+    except ImportError as error:
+        raise ConfigError(
+            "A memory in PostgreSQL needs packages that are missing.", hint=say_install("postgres")
+        ) from error
+    stem = shown_address(name).removeprefix("postgresql://")
+    return PostgresStore(name, path=usual_memory(data_folder(), "", stem), map_id=map_id)
+
+
+def is_database(name: str) -> bool:
+    """Return True for the address of a database, False for a file."""
+    return name.startswith(("postgresql://", "postgres://"))
+
+
+def read_places(store: "MemoryStore") -> "SemanticMap":
     """Read all places, and say on stderr what is odd about the file."""
-    places = store.read()
+    places = store.read().present()
     for warning in places.warnings:
         click.echo(f"mapspeak: {warning}", err=True)
     return places
@@ -73,6 +105,17 @@ def usual_memory(folder: Path, map_name: str, robot: str) -> Path:
         robot: The robot as it is shown, whose file it is then.
     """
     return folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', map_name or robot)}.yaml"
+
+
+def keep_usual_memory(folder: Path, map_name: str, robot: str, *, address: str) -> str:
+    """Return a served robot's own file, moved there from where older versions had it.
+
+    Args:
+        address: The robot's whole address, by which they named it.
+    """
+    path = usual_memory(folder, map_name, robot)
+    rename_memory(usual_memory(folder, map_name, address), path)
+    return str(path)
 
 
 def rename_memory(old: Path, new: Path) -> None:
@@ -176,11 +219,11 @@ def read_place(text: str) -> tuple[float, ...]:
 @click.option("--offset", type=click.IntRange(min=0), default=0, show_default=True)
 @MEMORY_OPTION
 @JSON_OPTION
-def episodes(semantic_map: Path | None, as_json: bool, **asked: Any) -> None:  # noqa: ANN401, FBT001 - click's options
+def episodes(semantic_map: str | None, as_json: bool, **asked: Any) -> None:  # noqa: ANN401, FBT001 - click's options
     """List observations that pass every filter, each with the reason why."""
     from mapspeak.memory.episodes.store import EpisodeStore, memory_folder  # noqa: PLC0415 - heavy
 
-    store = EpisodeStore(memory_folder(find_memory(semantic_map)))
+    store = EpisodeStore(memory_folder(open_memory(semantic_map).path))
     query = _query(**asked)
     page = store.find(query, rank=_rank(store) if asked["words"] or asked["near_words"] else None)
     if as_json:

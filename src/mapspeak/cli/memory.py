@@ -13,6 +13,7 @@ from mapspeak.cli.episodes import (
     episodes,
     find_memory,
     open_memory,
+    open_store,
     read_places,
     write_out,
 )
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 @click.option("--out", type=FILE, help="The file, such as hall.geojson; stdout without.")
 @ANCHOR_OPTION
 @MEMORY_OPTION
-def export(out: Path | None, anchor: "MapAnchor | None", semantic_map: Path | None) -> None:
+def export(out: Path | None, anchor: "MapAnchor | None", semantic_map: str | None) -> None:
     """Write the places as GeoJSON."""
     from mapspeak.memory.exchange.geojson import (  # noqa: PLC0415 - heavy; help must be quick
         to_geojson,
@@ -48,10 +49,11 @@ def export(out: Path | None, anchor: "MapAnchor | None", semantic_map: Path | No
 @click.command("import")
 @click.argument("file", type=FILE)
 @MEMORY_OPTION
-def import_(file: Path, semantic_map: Path | None) -> None:
+def import_(file: Path, semantic_map: str | None) -> None:
     """Join exported, perhaps edited GeoJSON into the semantic map file: all of it or nothing."""
-    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.exchange.geojson import from_geojson  # noqa: PLC0415
+    from mapspeak.memory.exchange.geojson import (  # noqa: PLC0415 - heavy; help must be quick
+        from_geojson,
+    )
     from mapspeak.memory.exchange.uniting import merge_into  # noqa: PLC0415
 
     try:
@@ -60,7 +62,7 @@ def import_(file: Path, semantic_map: Path | None) -> None:
         raise ConfigError(
             f"{file} cannot be read: {say_cause(error)}.", hint="Check its path."
         ) from error
-    store = SemanticMapStore(find_memory(semantic_map))
+    store = open_store(find_memory(semantic_map))
     _tell(merge_into(store, from_geojson(text)), store.path)
 
 
@@ -79,6 +81,44 @@ def merge(first: Path, second: Path, out: Path) -> None:
     click.echo(f"{came.n_observations} observations and {came.n_pictures} pictures came along.")
 
 
+@click.command()
+@click.argument("source")
+@click.argument("target")
+def copy(source: str, target: str) -> None:
+    """Copy a memory's places, events and frames into an empty one.
+
+    SOURCE and TARGET are files or postgresql:// addresses.
+    """
+    from mapspeak.memory.exchange.copying import (  # noqa: PLC0415 - heavy; help must be quick
+        copy_memory,
+    )
+
+    copied = copy_memory(open_memory(source), open_store(target))
+    click.echo(
+        f"{copied.n_places} places, {copied.n_events} events and {copied.n_frames} frames copied."
+    )
+
+
+@click.command()
+@click.argument("name", nargs=-1, required=True)
+@click.option("--undo", is_flag=True, help="Remember it again.")
+@MEMORY_OPTION
+def forget(name: tuple[str, ...], undo: bool, semantic_map: str | None) -> None:  # noqa: FBT001 - a flag
+    """Forget the place NAME, or every landmark of that label; kept in the file as `gone`."""
+    from mapspeak.memory.store import forgetting  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.text.recall import say_forgotten  # noqa: PLC0415 - likewise
+
+    store, words = open_memory(semantic_map), " ".join(name)
+    if undo:
+        done = forgetting.restore(store, words)
+    elif store.read().present().find_waypoint(words) is not None:
+        done = forgetting.forget_place(store, words)
+    else:
+        done = forgetting.forget_label(store, words)
+    click.echo(say_forgotten(done, words, is_undo=undo))
+    sys.exit(0 if done.places or done.n_landmarks else 1)
+
+
 def _tell(union: "Union", path: Path) -> None:
     for finding in union.findings:
         click.echo(finding)
@@ -94,7 +134,7 @@ def memory() -> None:
 @memory.command("list")
 @MEMORY_OPTION
 @JSON_OPTION
-def list_(semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
+def list_(semantic_map: str | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
     """List all places."""
     places = read_places(open_memory(semantic_map))
     if as_json:
@@ -109,7 +149,7 @@ def list_(semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a
 @click.argument("name", nargs=-1, required=True)
 @MEMORY_OPTION
 @JSON_OPTION
-def show(name: tuple[str, ...], semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
+def show(name: tuple[str, ...], semantic_map: str | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
     """Show all that is known of the place NAME."""
     facts = _facts(_named(" ".join(name), read_places(open_memory(semantic_map))))
     if as_json:
@@ -133,7 +173,7 @@ def show(name: tuple[str, ...], semantic_map: Path | None, as_json: bool) -> Non
 def find(
     words: tuple[str, ...],
     limit: int,
-    semantic_map: Path | None,
+    semantic_map: str | None,
     as_json: bool,  # noqa: FBT001 - a flag
 ) -> None:
     """Find the places and things that WORDS may mean.
@@ -176,7 +216,7 @@ def find(
 @click.option("--map", "map_file", type=FILE, help="A map_server .yaml that the places are on.")
 @MEMORY_OPTION
 @JSON_OPTION
-def check(map_file: Path | None, semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
+def check(map_file: Path | None, semantic_map: str | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
     """Check the file, and with --map whether what it says can be true on that map.
 
     Ends with 0 when nothing is odd, with 1 when something is, with 2 when the file has a fault.
@@ -199,7 +239,7 @@ def check(map_file: Path | None, semantic_map: Path | None, as_json: bool) -> No
     sys.exit(1 if findings else 0)
 
 
-for command in (episodes, export, import_, merge):
+for command in (copy, episodes, export, forget, import_, merge):
     memory.add_command(command)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import anyio
 
+from mapspeak.cli.episodes import is_database
 from mapspeak.cli.options import DEFAULT_WORLD, usual_modes
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
@@ -58,7 +59,7 @@ def name_robots(given: Sequence[str]) -> dict[str, str]:
     return named
 
 
-def split_files(given: Sequence[str], robots: Mapping[str, str], what: str) -> dict[str, Path]:
+def split_files(given: Sequence[str], robots: Mapping[str, str], what: str) -> dict[str, str]:
     """Return the file of each robot by its name: "NAME=FILE", or "FILE" for those without.
 
     Args:
@@ -69,7 +70,7 @@ def split_files(given: Sequence[str], robots: Mapping[str, str], what: str) -> d
     Raises:
         ConfigError: There is no robot of that name, or it has two files.
     """
-    files: dict[str, Path] = {}
+    files: dict[str, str] = {}
     for each in given:
         match = NAME.fullmatch(each)
         is_named = match is not None and match["name"] in robots
@@ -83,13 +84,35 @@ def split_files(given: Sequence[str], robots: Mapping[str, str], what: str) -> d
             raise ConfigError(
                 f"{what} is given twice for {name or 'all robots'}.", hint="Leave one of them away."
             )
-        files[name] = Path(path)
+        files[name] = path
     return files
 
 
-def file_for(name: str, files: Mapping[str, Path]) -> Path | None:
+def split_memories(given: Sequence[str], robots: Mapping[str, str]) -> dict[str, str | None]:
+    """Return the memory of each robot: a file, the address of a database, or None for the usual.
+
+    Raises:
+        ConfigError: As `split_files`, or several robots have one file.
+    """
+    memories = split_files(given, robots, "--memory")
+    for_all = name_for(ONLY, memories)
+    if len(robots) > 1 and for_all is not None and not is_database(for_all):
+        raise ConfigError(
+            "--memory needs a robot's name: places belong to one map.",
+            hint="Write --memory NAME=FILE for each robot.",
+        )
+    return {name: name_for(name, memories) for name in robots}
+
+
+def file_for(name: str, files: Mapping[str, str]) -> Path | None:
     """Return a robot's own file, else the one for all, else None."""
-    return files.get(name, files.get(ONLY))
+    file = name_for(name, files)
+    return None if file is None else Path(file)
+
+
+def name_for(name: str, given: Mapping[str, str]) -> str | None:
+    """Return what is said for a robot, else for all, else None."""
+    return given.get(name, given.get(ONLY))
 
 
 ROBOT_TOKEN_VARIABLE = "MAPSPEAK_ROBOT_TOKEN"  # noqa: S105 - the variable's name, not a token

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
-from mapspeak.cli.episodes import rename_memory, usual_memory
+from mapspeak.cli.episodes import keep_usual_memory, open_store
 from mapspeak.cli.options import (
     DEFAULT_WORLD,
     FILE,
@@ -30,7 +30,14 @@ from mapspeak.cli.options import (
     data_folder,
     read_pose,
 )
-from mapspeak.cli.robots import RobotChoice, file_for, name_robots, open_served_robot, split_files
+from mapspeak.cli.robots import (
+    RobotChoice,
+    file_for,
+    name_robots,
+    open_served_robot,
+    split_files,
+    split_memories,
+)
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
@@ -65,12 +72,12 @@ class RobotStart:
 
     Attributes:
         choice: Which robot, and how to reach it.
-        semantic_map: Its memory; None for the usual file.
+        memory: A file, or the address of a database; None for the usual file.
         guard: What its commands are held to.
     """
 
     choice: RobotChoice
-    semantic_map: Path | None
+    memory: str | None
     guard: GuardChoice
 
 
@@ -153,9 +160,9 @@ def _read_representation(
     "--semantic-map",
     "semantic_maps",
     multiple=True,
-    metavar="[NAME=]FILE",
-    help="The YAML file of remembered places. Unless given a simulated robot begins with an empty "
-    "one that is removed in the end, and others have one per map in the user's data folder.",
+    metavar="[NAME=]FILE|postgresql://...",
+    help="The YAML file of remembered places, or a fleet's database. Unless given, a simulated one "
+    "begins with an empty one, removed in the end; others have one per map in the data folder.",
 )
 @click.option(
     "--state-log", type=FILE, help="Write the simulator's truth here, as JSON lines, for scoring."
@@ -261,22 +268,17 @@ def _read_starts(
     """
     named = name_robots(given.robots)
     files = split_files(given.robot_files, named, "--robot-file")
-    maps = split_files(given.semantic_maps, named, "--memory")
+    memories = split_memories(given.semantic_maps, named)
     limits = split_files(given.policies, named, "--policy")
     if len(named) > 1 and _is_for_one(choice):
         raise ConfigError(
             "--state-log, --final-map, --map and --start are for one robot.",
             hint="Serve one, or leave them away.",
         )
-    if len(named) > 1 and file_for("", maps) is not None:
-        raise ConfigError(
-            "--memory needs a robot's name: places belong to one map.",
-            hint="Write --memory NAME=FILE for each robot.",
-        )
     return {
         name: RobotStart(
             choice=replace(choice, robot=address, robot_file=file_for(name, files)),
-            semantic_map=file_for(name, maps),
+            memory=memories[name],
             guard=replace(guard, policy=file_for(name, limits)),
         )
         for name, address in named.items()
@@ -331,7 +333,7 @@ def _tell_address(what: str, url: str) -> None:
 
 
 def _tell_typist(what: str) -> None:
-    """Tell a person who has typed the command that it waits for a program and not for them."""
+    """Tell a person who typed the command that it waits for a program."""
     if sys.stdin.isatty():
         other = shell_command("serve --http")
         click.echo(
@@ -344,20 +346,18 @@ def _tell_typist(what: str) -> None:
 async def _open_session(
     name: str, start: RobotStart, options: ServeOptions, links: AsyncExitStack, scratch: Path
 ) -> "Session":
-    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.session import Session  # noqa: PLC0415
+    from mapspeak.session import Session  # noqa: PLC0415 - heavy; help must be quick
 
     choice = start.choice
     guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)
     served = await links.enter_async_context(open_served_robot(choice))
-    path = start.semantic_map
-    if path is None:
+    file = start.memory
+    if file is None:
         folder = scratch / name if served.ros is None else data_folder()
-        path = usual_memory(folder, served.map_name, start.choice.shown)
-        rename_memory(usual_memory(folder, served.map_name, start.choice.robot), path)
+        file = keep_usual_memory(folder, served.map_name, choice.shown, address=choice.robot)
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
     lease_s = math.inf if options.http is None else options.lease_s
-    memory = SemanticMapStore(path, map_id=served.map_name or None)
+    memory = open_store(file, map_id=served.map_name or None)
     return Session(served.robot, memory, lease_s=lease_s, guard=guard, ros=served.ros)
 
 

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 
 from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import Point
-from mapspeak.memory import SemanticMapStore
+from mapspeak.memory import MemoryStore
 from mapspeak.memory.events import OPEN_AGAIN, ROBOT, SHUT, Effect, Event, current_events
 from mapspeak.places.recall.notices import end_event, find_hindrances
 from mapspeak.robot import GoalState
@@ -29,7 +29,7 @@ PAUSE_GROWTH = 4
 
 
 def learn_from_drive(
-    drive: Drive, store: SemanticMapStore, *, revision: MapRevision, now: datetime
+    drive: Drive, store: MemoryStore, *, revision: MapRevision, now: datetime
 ) -> tuple[Event, ...]:
     """Note the door at which a drive gave up, or end what was noted of one it came through.
 
@@ -91,7 +91,7 @@ def _find_door_ahead(
     return crossed[0] if crossed else None
 
 
-def _end(store: SemanticMapStore, event: Event, now: datetime) -> Event:
+def _end(store: MemoryStore, event: Event, now: datetime) -> Event:
     ended = end_event(store, event.id, now=now)
     return store.write_event(replace(ended, text=OPEN_AGAIN))
 

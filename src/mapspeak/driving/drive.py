@@ -16,7 +16,13 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.driving.drivemonitor import DriveMonitor, Look
-from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_tried_frontiers
+from mapspeak.driving.drivereport import (
+    JUST_SENT,
+    Drive,
+    DriveReport,
+    find_failed,
+    find_tried_frontiers,
+)
 from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Point, Pose
@@ -79,6 +85,11 @@ class DriveBook:
     def frontiers_tried(self) -> tuple[Point, ...]:
         """Where the robot has arrived, or lately could not get to, when sent to a frontier."""
         return find_tried_frontiers(self._drives.values())
+
+    @property
+    def failed(self) -> tuple[Drive, ...]:
+        """The drives that failed, the latest first, where no later one got there."""
+        return find_failed(self._drives.values())
 
     @property
     def is_busy(self) -> bool:

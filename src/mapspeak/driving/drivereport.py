@@ -75,3 +75,24 @@ def find_tried_frontiers(drives: Iterable[Drive]) -> tuple[Point, ...]:
     blocked = [drive for drive, state in ends[-N_BLOCKED_KEPT:] if state is GoalState.BLOCKED]
     tried = [drive for drive in [*arrived, *blocked] if FRONTIER.fullmatch(drive.place)]
     return tuple(drive.goal.point for drive in tried)
+
+
+SAME_GOAL_M = 0.5
+FAILED = (GoalState.BLOCKED, GoalState.REJECTED, GoalState.TIMED_OUT, GoalState.LOST)
+
+
+def find_failed(drives: Iterable[Drive]) -> tuple[Drive, ...]:
+    """Return the drives that failed, the latest first, but none where a later one ended otherwise.
+
+    Args:
+        drives: The oldest first.
+    """
+    failed: list[Drive] = []
+    for drive in drives:
+        state = None if drive.final is None else drive.final.state
+        if state is GoalState.ARRIVED or state in FAILED:
+            at = drive.goal.point
+            failed = [each for each in failed if each.goal.point.distance_to(at) > SAME_GOAL_M]
+        if state in FAILED:
+            failed.insert(0, drive)
+    return tuple(failed)

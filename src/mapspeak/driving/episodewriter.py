@@ -1,7 +1,7 @@
 """Every observation kept with its time, pose and picture; a failing disk costs nothing else."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from mapspeak.errors import SemanticMapError
@@ -55,7 +55,7 @@ class EpisodeWriter:
         labels: tuple[str, ...] = (),
         stamp_s: float | None = None,
         room_id: str | None = None,
-        map_id: str | None = None,
+        name_map: Callable[[], str | None],
     ) -> Keeping:
         """Keep what is observed now.
 
@@ -67,7 +67,7 @@ class EpisodeWriter:
             labels: What the robot's own detector reports in it.
             stamp_s: Robot time of the exposure.
             room_id: Where that is.
-            map_id: Which map the pose belongs to.
+            name_map: Tells which map the pose belongs to.
         """
         if self._wall_clock is None:
             return Keeping()
@@ -78,19 +78,24 @@ class EpisodeWriter:
             text=text,
             labels=labels,
             stamp_s=stamp_s,
-            map_id=map_id,
             room_id=room_id,
         )
-        return self._write(observation, picture)
+        return self._write(observation, name_map, picture)
 
-    def keep_record(self, waypoint: Waypoint) -> Keeping:
+    def keep_record(self, waypoint: Waypoint, *, name_map: Callable[[], str | None]) -> Keeping:
         """Keep that a place was written down, with what was seen this time."""
         observation = observation_of(waypoint) if self.is_open else None
-        return Keeping() if observation is None else self._write(observation)
+        return Keeping() if observation is None else self._write(observation, name_map)
 
-    def _write(self, observation: Observation, picture: bytes | None = None) -> Keeping:
+    def _write(
+        self,
+        observation: Observation,
+        name_map: Callable[[], str | None],
+        picture: bytes | None = None,
+    ) -> Keeping:
         try:
-            kept = self.store.write(observation, picture=picture)
+            of_map = replace(observation, map_id=name_map())
+            kept = self.store.write(of_map, picture=picture)
         except SemanticMapError as error:
             return Keeping(fault=f"It was not kept as an episode: {error}")
         return Keeping(picture=kept.picture)

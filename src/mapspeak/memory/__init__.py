@@ -19,7 +19,8 @@ from mapspeak.memory.policy import (
     tells_what_to_do,
 )
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store.semanticmap import SemanticMapStore, WriteReceipt
+from mapspeak.memory.store.memorystore import MemoryStore, WriteReceipt
+from mapspeak.memory.store.semanticmap import SemanticMapStore
 from mapspeak.memory.waypoint import Confidence, Landmark, SemanticMap, Waypoint
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Landmark",
     "LaserFan",
     "LaserRing",
+    "MemoryStore",
     "Merge",
     "PictureBook",
     "PictureReading",

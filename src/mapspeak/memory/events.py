@@ -3,11 +3,12 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory.frames import FrameId
 from mapspeak.memory.policy import tells_what_to_do
 from mapspeak.memory.quoting import clean_line, name_key, quote
 
@@ -49,6 +50,7 @@ ROBOT = "the robot"
 SHUT = "the robot could not get through"
 OPEN_AGAIN = f"{SHUT}, and came through later"
 """All that the robot notes by itself, and under which name."""
+_N_WORKDAYS = 5
 _ID = re.compile(r"[A-Za-z0-9_-]{1,16}")
 _PLACE_ID = re.compile(r"\b[RCOD]\d+\b")
 
@@ -66,6 +68,15 @@ class Effect(StrEnum):
     NONE = "none"
 
 
+class Every(StrEnum):
+    """How often an event comes again, at the hours and for as long as the first time."""
+
+    ONCE = "once"
+    DAY = "day"
+    WORKDAY = "workday"
+    WEEK = "week"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
     """Something that is so for a while.
@@ -74,7 +85,9 @@ class Event:
         place: Where, in words or ids of the time of writing: "corridor C1".
         outlines: Of the place at the time of writing, in the map frame; ids may change, and these
             do not.
-        until: The first moment after; None where nobody knows.
+        until: The first moment after; None where nobody knows. Of one that comes again, both are
+            of the first time.
+        frame: The frame of the memory that its place is in; None for its own.
 
     Raises:
         SemanticMapError: It has no words, an id that is none, no place where it needs one, or it
@@ -89,8 +102,10 @@ class Event:
     outlines: tuple[Outline, ...] = ()
     begins: datetime | None = None
     until: datetime | None = None
+    every: Every = Every.ONCE
     source: str = ""
     recorded_at: datetime | None = None
+    frame: FrameId = None
 
     def __post_init__(self) -> None:
         for key in ("id", "text", "place", "source"):
@@ -107,6 +122,38 @@ class Event:
             f"The event {self.told_text} ends before it begins",
             "Correct its times.",
         )
+        _require(
+            self.every is Every.ONCE or self._fits_between(),
+            f"The event {self.told_text} comes again every {self.every}, but has no beginning and "
+            "end with less than that between them",
+            "Say from when to when, such as 08:00 and 10:00.",
+        )
+
+    def _fits_between(self) -> bool:
+        if self.begins is None or self.until is None:
+            return False
+        return self.until - self.begins <= timedelta(days=7 if self.every is Every.WEEK else 1)
+
+    def find_time(self, now: datetime) -> tuple[datetime | None, datetime | None]:
+        """Return from when to when it lasts: now, else the next time."""
+        if self.every is Every.ONCE or self.begins is None or self.until is None:
+            return self.begins, self.until
+        length, zone = self.until - self.begins, self.begins.tzinfo
+        day = max((now - length).astimezone(zone), self.begins).date()
+        while True:
+            begins = datetime.combine(day, self.begins.timetz())
+            is_day = (
+                self.every is Every.DAY
+                or (self.every is Every.WORKDAY and begins.weekday() < _N_WORKDAYS)
+                or (self.every is Every.WEEK and begins.weekday() == self.begins.weekday())
+            )
+            if is_day and now < begins + length:
+                return begins, begins + length
+            day += timedelta(days=1)
+
+    def is_over(self, now: datetime) -> bool:
+        """Return True where it does not come any more."""
+        return self.every is Every.ONCE and self.until is not None and self.until <= now
 
     @property
     def is_of_robot(self) -> bool:
@@ -116,8 +163,8 @@ class Event:
 
     def is_current(self, now: datetime) -> bool:
         """Return True while it lasts; `now` has a zone."""
-        has_begun = self.begins is None or self.begins <= now
-        return has_begun and (self.until is None or now < self.until)
+        begins, until = self.find_time(now)
+        return (begins is None or begins <= now) and (until is None or now < until)
 
     def moved(self, motion: Pose) -> "Event":
         """Return it in another frame, by the transform from the present one to that."""
@@ -146,10 +193,13 @@ class Event:
         parts = [f"{self.told_title}{where}"]
         if self.effect is not Effect.NONE:
             parts.append(_EFFECTS[self.effect])
-        if self.begins is not None and self.begins > now:
-            parts.append(f"from {_say_time(self.begins, now)}")
-        if self.until is not None:
-            parts.append(f"until {_say_time(self.until, now)}")
+        begins, until = self.find_time(now)
+        if begins is not None and begins > now:
+            parts.append(f"from {_say_time(begins, now)}")
+        if until is not None:
+            parts.append(f"until {_say_time(until, now)}")
+        if self.every is not Every.ONCE:
+            parts.append(f"again every {self.every}")
         return f"{', '.join(parts)}{self._say_source()}."
 
     def _say_source(self) -> str:

@@ -24,6 +24,11 @@ SAME_SPOT_M = 0.5
 """From so near by a thing 3 m away has the same bearing to 10 degrees."""
 SAME_POSE_M = 0.05
 """A pose so near by is the same one, estimated again."""
+LEAST_HALF_VIEW_RAD = math.radians(20.0)
+"""Every usual camera shows so much to either side."""
+CONE_MARGIN_RAD = math.radians(5.0)
+NEAR_M = 4.0
+"""From no farther, who looks at a thing would name it."""
 MOST_VIEWS = 4
 """A thing is not seen from more sides than a robot can come from; more tell hardly more."""
 
@@ -71,6 +76,7 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
     """
     if before is None:
         return Merge(waypoint=now, new=now.landmarks, merged=(), kept=(), gone=())
+    whole, before = before, before.present()
     gone_keys = {name_key(label) for label in gone}
     of_safety = _group(before, before.safety_landmarks)
     of_all = (*of_safety, *_group(before, before.functional_landmarks))
@@ -80,15 +86,30 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
     united = {j: _noted(_united(looks[j], old[i]), now) for j, i in partner.items()}
     missed = [i for i in range(len(old)) if i not in partner.values()]
     lasting = [i for i in missed if name_key(old[i][0].label) not in gone_keys]
-    kept = {i: _noted(old[i], now) for i in lasting}
+    # A record that is joined again is the same look: it misses nothing twice.
+    is_new_look = now.recorded_at is None or now.recorded_at != before.recorded_at
+    kept = {i: _noted(_counted(old[i], now) if is_new_look else old[i], now) for i in lasting}
     after = [united.get(j, (thing,)) for j, thing in enumerate(now.landmarks)]
     n_now, n_before = len(now.safety_landmarks), len(of_safety)
     safety = (*after[:n_now], *(views for i, views in kept.items() if i < n_before))
     functional = (*after[n_now:], *(views for i, views in kept.items() if i >= n_before))
+    left = {i: _noted(_as_gone(old[i]), now) for i in missed if i not in kept}
+    past = [
+        _find_past(whole, each, now)
+        for each in (whole.safety_landmarks, whole.functional_landmarks)
+    ]
     waypoint = replace(
         now,
-        safety_landmarks=tuple(chain.from_iterable(safety)),
-        functional_landmarks=tuple(chain.from_iterable(functional)),
+        safety_landmarks=(
+            *chain.from_iterable(safety),
+            *chain.from_iterable(views for i, views in left.items() if i < n_before),
+            *past[0],
+        ),
+        functional_landmarks=(
+            *chain.from_iterable(functional),
+            *chain.from_iterable(views for i, views in left.items() if i >= n_before),
+            *past[1],
+        ),
         geometric_features=now.geometric_features or before.geometric_features,
     )
     return Merge(
@@ -165,6 +186,53 @@ def _group(waypoint: Waypoint, landmarks: Iterable[Landmark]) -> tuple[Views, ..
         else:
             group.append(landmark)
     return tuple(map(tuple, groups))
+
+
+def find_cone(look: Waypoint) -> tuple[float, float] | None:
+    """Return from which to which bearing a look must have shown what was there; None for nowhere.
+
+    That is between the outermost things that it names, and in the middle of its picture.
+    """
+    own = [each for each in look.standpoints[0].landmarks if not _is_of_earlier(each)]
+    bearings = [each.bearing_rad for each in own if each.bearing_rad is not None]
+    bearings = bearings if len(bearings) > 1 else []
+    if look.picture is not None:
+        bearings += [-LEAST_HALF_VIEW_RAD, LEAST_HALF_VIEW_RAD]
+    if not bearings:
+        return None
+    return min(bearings) - CONE_MARGIN_RAD, max(bearings) + CONE_MARGIN_RAD
+
+
+def find_named(look: Waypoint) -> list[Landmark]:
+    """Return what a record names of its latest look, without what it keeps of earlier ones."""
+    return [each for each in look.landmarks if not _is_of_earlier(each)]
+
+
+def _is_of_earlier(landmark: Landmark) -> bool:
+    return landmark.stamp_s is not None or landmark.recorded_at is not None
+
+
+def _counted(views: Views, now: Waypoint) -> Views:
+    """Return views of a thing that a look does not name: missed once more where it should."""
+    latest, *others = views
+    here = seen_from(latest, latest.pose or now.pose, now.pose)
+    cone = find_cone(now)
+    is_near = here.range_m is None or here.range_m <= NEAR_M
+    if cone is None or here.bearing_rad is None or not is_near:
+        return views
+    is_shown = cone[0] <= wrap_angle(here.bearing_rad) <= cone[1]
+    return (replace(latest, n_missed=latest.n_missed + is_shown), *others)
+
+
+def _as_gone(views: Views) -> Views:
+    return tuple(replace(each, is_gone=True) for each in views)
+
+
+def _find_past(before: Waypoint, landmarks: Iterable[Landmark], now: Waypoint) -> Views:
+    """Return what was gone before, but for what is seen again: that is there, as something new."""
+    back = {name_key(each.label) for each in now.landmarks}
+    past = tuple(each for each in landmarks if each.is_gone and name_key(each.label) not in back)
+    return _noted(_dated_views(before, past), now)
 
 
 def _dated_views(waypoint: Waypoint, views: Views) -> Views:

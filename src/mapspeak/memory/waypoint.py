@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.memory.frames import NO_FRAMES, FrameId, Frames
 from mapspeak.memory.laserfan import LaserFan
 from mapspeak.memory.quoting import clean_line, clean_text, name_key
 
@@ -34,6 +35,8 @@ class Landmark:
         recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
         pose: The pose it was seen from, in the map frame, if not the waypoint's.
         laser: What the robot's laser met around that direction, from that pose.
+        n_missed: Looks since it was last seen, from that place, that should have shown it.
+        is_gone: It is not there any more, or is to be forgotten; kept so that this can be undone.
 
     Raises:
         SemanticMapError: The label is empty.
@@ -51,6 +54,8 @@ class Landmark:
     pose: Pose | None = None
     range_from: str | None = None
     laser: LaserFan | None = None
+    n_missed: int = 0
+    is_gone: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
@@ -70,6 +75,8 @@ class Waypoint:
         stamp_s: Robot time of the observation.
         map_id: Which map the pose belongs to; None where the store decides.
         room_id: The room or corridor it was observed from, by the id that it had then.
+        frame: The frame of that map that its poses are in; None for the memory's own.
+        is_gone: It is to be forgotten; kept so that this can be undone.
 
     Raises:
         SemanticMapError: The name is empty.
@@ -86,18 +93,32 @@ class Waypoint:
     map_id: str | None = None
     room_id: str | None = None
     picture: str | None = None
+    frame: FrameId = None
+    is_gone: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", _required_line(self.name, "A waypoint's name"))
         object.__setattr__(self, "description", clean_text(self.description))
         features = (clean_line(feature) for feature in self.geometric_features)
         object.__setattr__(self, "geometric_features", tuple(filter(None, features)))
-        _clean_lines(self, "room_id", "picture")
+        _clean_lines(self, "room_id", "picture", "frame")
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
         """The safety landmarks, then the functional ones."""
         return self.safety_landmarks + self.functional_landmarks
+
+    def present(self) -> "Waypoint":
+        """Return it without the landmarks that are gone."""
+        if not any(each.is_gone for each in self.landmarks):
+            return self
+        return replace(
+            self,
+            safety_landmarks=tuple(each for each in self.safety_landmarks if not each.is_gone),
+            functional_landmarks=tuple(
+                each for each in self.functional_landmarks if not each.is_gone
+            ),
+        )
 
     @property
     def standpoints(self) -> tuple["Waypoint", ...]:
@@ -155,13 +176,24 @@ class SemanticMap:
     """All remembered places of one map (paper eq. 9).
 
     Attributes:
+        frames: Those that records name.
+        elsewhere: Places of frames of which it is not known how they lie to the robot's map.
+        n_events_elsewhere: How many events are left out for the same reason.
         warnings: What its reader should know: another map's places, a file that is broken by now,
             a key that looks misspelt.
     """
 
     map_id: str | None = None
     waypoints: tuple[Waypoint, ...] = ()
+    frames: Frames = NO_FRAMES
+    elsewhere: tuple[Waypoint, ...] = ()
+    n_events_elsewhere: int = 0
     warnings: tuple[str, ...] = ()
+
+    def present(self) -> "SemanticMap":
+        """Return it without what is gone or forgotten."""
+        waypoints = tuple(each.present() for each in self.waypoints if not each.is_gone)
+        return replace(self, waypoints=waypoints)
 
     def find_waypoint(self, name: str) -> Waypoint | None:
         """Return the place of that name, whatever its case, or None."""

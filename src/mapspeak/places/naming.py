@@ -7,19 +7,20 @@ from dataclasses import dataclass
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.memory import name_key
+from mapspeak.memory import SemanticMap, Waypoint, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.search.answer import Answer, Basis, Verdict
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.standing import stand_before
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.rooms import Door, Region
+from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 MOST_NAMED = 12
 MOST_GUESSES = 3
 ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>\d+)")
+REGION_ID = re.compile(r"(?<!\w)[RCO]\d+(?!\w)", re.IGNORECASE)
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 SPOT = re.compile(
     rf"\(?\s*(?:x\s*=?\s*)?(?P<x>{NUMBER})\s*[,; ]\s*(?:y\s*=?\s*)?(?P<y>{NUMBER})"
@@ -101,6 +102,13 @@ def no_such_place(world: WorldModel, words: str) -> GoalError:
     return GoalError(_what_became_of(world, wanted), hint=hint, step=step)
 
 
+def find_renamed(world: WorldModel, words: str) -> dict[str, str]:
+    """Return the ids in words that regions have no longer, each with what that is called now."""
+    former = world.rooms.former_ids
+    ids = dict.fromkeys(each.upper() for each in REGION_ID.findall(words))
+    return {each: former[each] for each in ids if each in former}
+
+
 def is_taken_name(name: str) -> bool:
     """Return True for what is read as no remembered name: "R3", "1, 2", "robot"."""
     words = name.strip()
@@ -168,14 +176,31 @@ def _what_became_of(world: WorldModel, place: str) -> str:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
     if re.fullmatch(r"[Tt]\d+", place) and 1 <= int(place[1:]) <= world.recollection.n_named:
         return f"The thing {place.upper()} is no longer remembered."
+    if find_elsewhere(world.memory, place):
+        return f"{place[:80]!r} is remembered on another map; where that lies is not known here."
     return f"There is no place called {place[:80]!r}."
 
 
+def find_elsewhere(memory: SemanticMap, words: str) -> tuple[Waypoint, ...]:
+    """Return the places of other maps that words name, or that name a thing of the words."""
+    wanted = name_key(words)
+    return tuple(
+        place
+        for place in memory.elsewhere
+        if any(
+            re.search(rf"(?<!\w){re.escape(name_key(name))}(?!\w)", wanted)
+            for name in (place.name, *(each.label for each in place.landmarks))
+        )
+    )
+
+
 def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
+    if find_elsewhere(world.memory, wanted):
+        return "Let the robot see more of the building", NextStep.ALIGN
     if world.places and not ID.fullmatch(wanted):
         answer = world.recollection.find(wanted, limit=MOST_GUESSES)
         if answer.verdict is not Verdict.NOT_REMEMBERED:
-            return _say_guesses(answer), NextStep.READ_MORE
+            return f"{_say_guesses(answer)} {_say_phrases(world, wanted)}", NextStep.READ_MORE
     groups = {
         "rooms and corridors": [region.id for region in world.rooms.regions],
         "doors": [door.id for door in world.rooms.doors],
@@ -183,7 +208,35 @@ def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
         "remembered": [place.id for place in world.places],
     }
     known = [f"{name} {_some_of(ids)}" for name, ids in groups.items() if ids]
-    return f"Known are {'; '.join(known) or 'no places yet'}.", NextStep.SEE_PLACES
+    phrases = "" if ID.fullmatch(wanted) else _say_phrases(world, wanted)
+    hint = f"Known are {'; '.join(known) or 'no places yet'}. {phrases}".rstrip()
+    return hint, NextStep.SEE_PLACES
+
+
+MOST_PHRASES = 3
+
+
+def _say_phrases(world: WorldModel, wanted: str) -> str:
+    """Say what words would be read here, those first that speak of the same kind of thing."""
+    regions, doors = world.rooms.regions, world.rooms.doors
+    kinds = {
+        "room": any(each.room_class is RoomClass.ROOM for each in regions),
+        "door": bool(doors),
+        "corridor": any(each.room_class is RoomClass.CORRIDOR for each in regions),
+    }
+    known = [kind for kind, is_known in kinds.items() if is_known]
+    asked = [kind for kind in known if kind in wanted.casefold()]
+    named = [each.id for each in regions if re.search(rf"\b{each.id}\b", wanted, re.IGNORECASE)]
+    if named:
+        phrases = [f"{where} {named[0]}" for where in ("the middle of", "next to", "facing")]
+    elif asked:
+        phrases = [f"{which} {asked[0]}" for which in ("nearest", "largest")]
+        phrases.append(f"all {asked[0]}s")
+    else:
+        phrases = [f"nearest {kind}" for kind in known]
+        phrases += [f"the middle of {each.id}" for each in regions[:1]]
+        phrases.append("2 m in front of the robot")
+    return f"Such words can be read: {', '.join(map(repr, phrases[:MOST_PHRASES]))}."
 
 
 def _say_guesses(answer: Answer) -> str:

@@ -20,6 +20,7 @@ from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts
+from mapspeak.server.remarks import Remarks
 from mapspeak.server.text.offered import offering, say_error, write_instructions
 from mapspeak.server.text.wording import show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
@@ -68,6 +69,7 @@ class MapspeakServer(MCPServer[Any]):
         self._lists: dict[str, frozenset[str]] = {}
         self._former: dict[str, Mapping[str, str]] = {}
         self._remembering: set[str] = set()
+        self._remarks = Remarks(session)
 
     @property
     def n_tools(self) -> int:
@@ -105,17 +107,21 @@ class MapspeakServer(MCPServer[Any]):
         caller = Caller(client=name_client(context), tool=name)
         with self._session.client_is_heard(), calling(caller), offering(self._arguments):
             self._check_arguments(name, arguments)
+            await self._remarks.meet(caller.client)
             try:
                 answer = await self._call_with_approval(name, arguments, context)
             except ToolError as error:
                 readable = _explain(name, error.__cause__)
                 if readable is None:
                     raise
+                renamed = await self._remarks.say_renamed(arguments)
+                if renamed not in readable:
+                    readable = f"{renamed} {readable}"
                 raise ToolError(show_controls(readable)) from error.__cause__
             self._note_memory(name, arguments)
             if not isinstance(answer, CallToolResult):
                 return answer
-            return show_controls_of(answer)
+            return show_controls_of(await self._remarks.tell(caller.client, arguments, answer))
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Note in the audit log that a tool has changed what is remembered."""

@@ -1,6 +1,6 @@
 """The map under ids: rooms, doors, frontiers and remembered places, as everybody names them."""
 
-from collections.abc import Callable, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
@@ -69,6 +69,8 @@ def find_crossing(rooms: RoomMap, distances: DistanceField, door: Door) -> Point
 
 
 STEP_M = 0.2
+HIDDEN_M2 = 3.0
+"""A frontier that promises less leads to no room of its own: hardly a toilet is smaller."""
 
 Key = TypeVar("Key")
 Found = TypeVar("Found")
@@ -315,15 +317,21 @@ class WorldModel:
         return next(filter(None, map(self.find_room_id, points)), None)
 
     @cached_property
-    def growing_ids(self) -> frozenset[str]:
-        """The regions that border on the unknown: their areas are not final."""
-        frontiers = self.frontiers
-        borders = (
-            *(frontier.pose.point for frontier in frontiers.frontiers),
-            *(frontier.anchor for frontier in frontiers.frontiers),
-            *(refused.anchor for refused in frontiers.refused),
-        )
-        return frozenset(filter(None, map(self.find_room_id, borders)))
+    def growth_m2(self) -> Mapping[str, float]:
+        """How much more floor the frontiers of a region promise, if it borders on the unknown."""
+        growth_m2: dict[str, float] = {}
+        for refused in self.frontiers.refused:
+            growth_m2.setdefault(self.find_room_id(refused.anchor) or "", 0.0)
+        for frontier in self.frontiers.frontiers:
+            for room_id in {self.find_room_id(at) for at in (frontier.pose.point, frontier.anchor)}:
+                growth_m2[room_id or ""] = growth_m2.get(room_id or "", 0.0) + frontier.gain_m2
+        growth_m2.pop("", None)
+        return growth_m2
+
+    @property
+    def may_hide_rooms(self) -> bool:
+        """True while a frontier promises as much floor as a room has."""
+        return any(frontier.gain_m2 >= HIDDEN_M2 for frontier in self.frontiers.frontiers)
 
 
 def _keep(known: MutableMapping[Key, Found], key: Key, find: Callable[[], Found]) -> Found:

@@ -19,7 +19,8 @@ from mapspeak.memory.search.answer import Answer, Basis, Entry, EntryKind, list_
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
 from mapspeak.memory.things.finding import Things, find_things
-from mapspeak.memory.things.thing import Category, Thing, name_the_same
+from mapspeak.memory.things.labels import name_the_same
+from mapspeak.memory.things.thing import Category, Thing
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms.identity import match_best_first
 

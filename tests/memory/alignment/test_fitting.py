@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from alignment_maps import HOUSE, OTHER_HOUSE, TWIN_HOUSES, fine, moved
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory.alignment.comparing import MapRelation, compare_maps
 from mapspeak.memory.alignment.fitting import LEAST_SHARED_M, Certainty, MapFit, find_fit
-from mapspeak.memory.alignment.keeping import MapRelation, compare_maps
 from mapspeak.memory.alignment.surfaces import MapSurfaces
 from mapspeak.spatial import OccupancyGrid
 

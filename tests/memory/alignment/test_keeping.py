@@ -10,16 +10,18 @@ from alignment_maps import HOUSE, OTHER_HOUSE, fine, moved
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
+from mapspeak.memory.alignment.comparing import MapRelation
 from mapspeak.memory.alignment.fitting import Certainty
-from mapspeak.memory.alignment.keeping import FIRST_NAME, MapKeeper, MapRelation
-from mapspeak.memory.episodes.observation import Observation, ObservationKind
-from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
+from mapspeak.memory.alignment.framed import FramedMemory
 from mapspeak.memory.events import Effect, Event
 from mapspeak.server.text.findings import say_receipt
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 
 MOTION = Pose(3.0, -1.0, math.radians(40))
+TWICE = Pose(-2.0, 5.0, math.radians(-115))
+MAP, MOVED, OTHER = fine(HOUSE), moved(fine(HOUSE), MOTION), fine(OTHER_HOUSE)
+MOVED_TWICE = moved(fine(HOUSE), TWICE)
 DOCK = Waypoint(
     name="dock",
     pose=Pose(2.0, 3.0, 0.5),
@@ -34,280 +36,281 @@ WET = Event(
     outlines=((Point(0.0, 0.0), Point(2.0, 0.0), Point(2.0, 2.0)),),
     until=datetime(2026, 11, 22, 14, 0, tzinfo=UTC),
 )
-SEEN = Observation(
-    recorded_at=datetime(2026, 11, 22, 9, 0, tzinfo=UTC),
-    pose=Pose(5.0, 2.0, 3.0),
-    kind=ObservationKind.NOTE,
-    text="a ladder",
-    room_id="R1",
-)
 
 
 @pytest.fixture
 def store(tmp_path: Path) -> SemanticMapStore:
-    store = SemanticMapStore(tmp_path / "places.yaml")
-    store.write(DOCK)
-    store.write(SINK)
-    return store
+    return SemanticMapStore(tmp_path / "places.yaml", map_id="house")
 
 
 @pytest.fixture
-def episodes(store: SemanticMapStore) -> EpisodeStore:
-    return EpisodeStore(memory_folder(store.path))
+def memory(store: SemanticMapStore) -> FramedMemory:
+    """A memory of the house with two places."""
+    memory = opened(store, MAP)
+    memory.write(DOCK)
+    memory.write(SINK)
+    return memory
 
 
-@pytest.fixture
-def keeper(store: SemanticMapStore) -> MapKeeper:
-    keeper = MapKeeper(store)
-    keeper.keep(fine(HOUSE))
-    return keeper
+def opened(store: SemanticMapStore, grid: OccupancyGrid, *, map_id: str = "house") -> FramedMemory:
+    """The memory as a robot sees it that has just begun a map."""
+    memory = FramedMemory(SemanticMapStore(store.path, map_id=map_id), name_robot=lambda: "r1")
+    memory.meet(grid)
+    return memory
 
 
 def snapshot(store: SemanticMapStore, name: str = "map.yaml") -> OccupancyGrid:
     return load_map(store.path.with_name("places.memory") / name).grid
 
 
-def test_the_map_is_kept_beside_the_records(keeper: MapKeeper, store: SemanticMapStore) -> None:
-    assert (snapshot(store).cells == fine(HOUSE).cells).all()
-    assert keeper.compare(fine(HOUSE)) is not None
+def here(memory: FramedMemory) -> list[str]:
+    return [each.name for each in memory.read().waypoints]
+
+
+def elsewhere(memory: FramedMemory) -> list[str]:
+    return [each.name for each in memory.read().elsewhere]
+
+
+@pytest.mark.usefixtures("memory")
+def test_the_map_is_kept_beside_the_records(store: SemanticMapStore) -> None:
+    assert (snapshot(store).cells == MAP.cells).all()
+    assert here(opened(store, MAP)) == ["dock", "sink"]
+
+
+def test_of_two_robots_that_begin_at_once_on_different_maps_each_has_its_own_frame(
+    store: SemanticMapStore,
+) -> None:
+    first, second = opened(store, MAP), opened(store, MOVED)
+
+    first.write(DOCK)
+    second.write(SINK)
+
+    assert (here(first), elsewhere(first)) == (["dock"], ["sink"])
+    assert (here(second), elsewhere(second)) == (["sink"], ["dock"])
+    assert (snapshot(store).cells == MAP.cells).all()
+
+
+def test_of_two_robots_that_begin_at_once_on_one_map_each_reads_the_other_s_places(
+    store: SemanticMapStore,
+) -> None:
+    first, second = opened(store, MAP), opened(store, MAP)
+
+    first.write(DOCK)
+    second.write(SINK)
+
+    assert here(first) == here(second) == ["dock", "sink"]
 
 
 def test_free_cells_that_are_probabilities_are_kept_as_free(store: SemanticMapStore) -> None:
-    house = fine(HOUSE)
-    cells = np.where(house.free, 45, np.where(house.occupied, 60, -1)).astype(np.int8)
+    cells = np.where(MAP.free, 45, np.where(MAP.occupied, 60, -1)).astype(np.int8)
 
-    MapKeeper(store).keep(OccupancyGrid(cells=cells, resolution_m=0.1))
+    opened(store, OccupancyGrid(cells=cells, resolution_m=0.1)).write(DOCK)
 
-    assert (snapshot(store).free == house.free).all()
-    assert (snapshot(store).occupied == house.occupied).all()
+    assert (snapshot(store).free == MAP.free).all()
+    assert (snapshot(store).occupied == MAP.occupied).all()
 
 
+@pytest.mark.usefixtures("memory")
 def test_a_crash_between_map_and_picture_leaves_the_pair_of_before(
-    keeper: MapKeeper, store: SemanticMapStore
+    store: SemanticMapStore,
 ) -> None:
     folder = store.path.with_name("places.memory")
     (folder / "map-01234567.pgm").write_bytes(b"half of a pict")
 
-    comparison = MapKeeper(store).compare(fine(HOUSE))
-
-    assert comparison is not None
-    assert comparison.relation is MapRelation.SAME
-    assert keeper.compare(fine(HOUSE)) == comparison
+    assert here(opened(store, MAP)) == ["dock", "sink"]
 
 
 def test_a_map_that_has_grown_is_kept_in_place_of_the_old_one(store: SemanticMapStore) -> None:
-    house = fine(HOUSE)
-    keeper = MapKeeper(store)
-    keeper.keep(house.crop(slice(0, house.n_rows), slice(0, 120)))
+    memory = opened(store, MAP.crop(slice(0, MAP.n_rows), slice(0, 120)))
+    memory.write(DOCK)
+    memory.meet(MAP)
+    memory.write(SINK)
 
-    comparison = keeper.keep(house)
-
-    assert comparison is not None
-    assert comparison.relation is MapRelation.SAME
-    assert (snapshot(store).cells == house.cells).all()
+    assert here(memory) == ["dock", "sink"]
+    assert (snapshot(store).cells == MAP.cells).all()
     assert len(list(store.path.with_name("places.memory").glob("*.pgm"))) == 1
 
 
 def test_a_map_that_has_hardly_grown_is_not_written_again(
-    keeper: MapKeeper, store: SemanticMapStore
+    memory: FramedMemory, store: SemanticMapStore
 ) -> None:
     before = snapshot(store)
-    cells = fine(HOUSE).cells.copy()
+    cells = MAP.cells.copy()
     cells[40:44, 60:64] = 100
 
-    keeper.keep(OccupancyGrid(cells=cells, resolution_m=0.1))
+    memory.meet(OccupancyGrid(cells=cells, resolution_m=0.1))
+    memory.write(SINK)
 
     assert (snapshot(store).cells == before.cells).all()
 
 
 def test_a_map_with_hardly_a_wall_is_not_kept(store: SemanticMapStore) -> None:
-    keeper = MapKeeper(store)
-    blank = OccupancyGrid(cells=fine(HOUSE).cells[5:20, 5:20], resolution_m=0.1)
+    blank = OccupancyGrid(cells=MAP.cells[5:20, 5:20], resolution_m=0.1)
+    memory = opened(store, blank)
+    memory.write(DOCK)
 
-    assert keeper.keep(blank) is None
-    assert keeper.compare(blank) is None
+    assert not store.path.with_name("places.memory").exists()
+    assert here(memory) == ["dock"]
+    assert memory.keeper.compare() is None
 
 
-def test_another_buildings_map_is_not_kept_and_said(
-    keeper: MapKeeper, store: SemanticMapStore
+@pytest.mark.parametrize(
+    ("grid", "relation"), [(OTHER, MapRelation.OTHER), (MOVED, MapRelation.MOVED)]
+)
+@pytest.mark.usefixtures("memory")
+def test_records_of_another_map_are_not_here(
+    store: SemanticMapStore, grid: OccupancyGrid, relation: MapRelation
 ) -> None:
-    comparison = keeper.keep(fine(OTHER_HOUSE))
+    memory = opened(store, grid)
+    comparison = memory.keeper.compare()
 
     assert comparison is not None
-    assert comparison.relation is MapRelation.OTHER
-    assert (snapshot(store).cells == fine(HOUSE).cells).all()
+    assert comparison.relation is relation
+    assert (here(memory), elsewhere(memory)) == ([], ["dock", "sink"])
 
 
-def test_records_move_with_their_map(keeper: MapKeeper, store: SemanticMapStore) -> None:
-    store.write_event(WET)
-    landmarks = store.read().waypoints[0].landmarks
+def test_a_map_that_jumps_takes_no_record_along(memory: FramedMemory) -> None:
+    memory.meet(MOVED)
 
-    receipt = keeper.realign(moved(fine(HOUSE), MOTION))
+    assert (here(memory), elsewhere(memory)) == ([], ["dock", "sink"])
+
+    memory.meet(MAP)
+
+    assert (here(memory), elsewhere(memory)) == (["dock", "sink"], [])
+
+
+@pytest.mark.usefixtures("memory")
+def test_a_write_on_another_map_goes_into_a_frame_of_its_own(store: SemanticMapStore) -> None:
+    memory = opened(store, OTHER, map_id="annex")
+    memory.write(replace(DOCK, name="oven"))
+    memory.write_event(WET)
+
+    assert (here(memory), elsewhere(memory)) == (["oven"], ["dock", "sink"])
+    (frame,) = store.read().frames.items
+    assert (frame.id, frame.map_id, frame.robot, frame.pose) == ("F2", "annex", "r1", None)
+    assert (snapshot(store, frame.walls or "").cells == OTHER.cells).all()
+    assert (snapshot(store).cells == MAP.cells).all()
+    again = opened(store, OTHER)
+    assert here(again) == ["oven"]
+    assert [each.text for each in again.read_events()] == ["wet floor"]
+    assert opened(store, MAP).read_events() == ()
+
+
+def test_the_walls_of_a_frame_are_kept_once_there_are_any(store: SemanticMapStore) -> None:
+    opened(store, OTHER).write(DOCK)
+    memory = opened(store, OccupancyGrid(cells=MAP.cells[5:20, 5:20], resolution_m=0.1))
+    memory.write(SINK)
+
+    memory.meet(OccupancyGrid(cells=MAP.cells[5:60, 5:60], resolution_m=0.1))
+    memory.write(SINK)
+
+    (frame,) = store.read().frames.items
+    assert frame.walls == "map-2.yaml"
+
+
+def test_a_frame_gets_one_transform_and_no_record_changes(
+    memory: FramedMemory, store: SemanticMapStore
+) -> None:
+    memory.write_event(WET)
+    before = store.read()
+    there = opened(store, MOVED)
+    there.write(replace(SINK, name="tap", pose=MOTION @ SINK.pose))
+
+    receipt = there.keeper.realign()
 
     assert receipt.certainty is Certainty.SURE
     assert (receipt.n_waypoints, receipt.n_events) == (2, 1)
-    said = say_receipt(receipt)
-    assert "2 waypoints, 1 events and 0 observations were moved: turned by 40.0" in said
-    assert said.endswith("Certainty: sure.")
-    dock, sink = store.read().waypoints
-    for waypoint, before in ((dock, DOCK), (sink, SINK)):
-        truth = MOTION @ before.pose
-        assert waypoint.pose.point.distance_to(truth.point) < 0.1
-        assert math.isclose(waypoint.pose.yaw_rad, truth.yaw_rad, abs_tol=0.01)
-    assert dock.landmarks == landmarks
-    (wet,) = store.read_events()
+    assert store.read().waypoints[:2] == before.waypoints
+    poses = {each.name: each.pose for each in there.read().waypoints}
+    for name, pose in (("dock", DOCK.pose), ("sink", SINK.pose), ("tap", SINK.pose)):
+        truth = MOTION @ pose
+        assert poses[name].point.distance_to(truth.point) < 0.05
+        assert math.isclose(poses[name].yaw_rad, truth.yaw_rad, abs_tol=0.01)
+    (wet,) = there.read_events()
     assert wet.at is not None
-    assert wet.at.distance_to(MOTION.transform(Point(1.0, 1.0))) < 0.1
-    assert wet.outlines[0][1].distance_to(MOTION.transform(Point(2.0, 0.0))) < 0.1
+    assert wet.at.distance_to(MOTION.transform(Point(1.0, 1.0))) < 0.05
+    assert "2 waypoints and 1 events more can be used here" in say_receipt(receipt)
 
 
+@pytest.mark.usefixtures("memory")
 def test_rooms_of_the_old_map_are_left_away(store: SemanticMapStore) -> None:
-    store.write(replace(DOCK, room_id="R3"))
-    keeper = MapKeeper(store)
-    keeper.keep(fine(HOUSE))
+    memory = opened(store, MAP)
+    memory.write(replace(DOCK, room_id="R3"))
+    there = opened(store, MOVED)
+    there.keeper.realign()
 
-    keeper.realign(moved(fine(HOUSE), MOTION))
-
-    assert [each.room_id for each in store.read().waypoints] == [None, None]
-
-
-def test_observations_move_with_their_map(store: SemanticMapStore, episodes: EpisodeStore) -> None:
-    keeper = MapKeeper(store, episodes)
-    keeper.keep(fine(HOUSE))
-    seen = episodes.write(SEEN)
-
-    receipt = keeper.realign(moved(fine(HOUSE), MOTION))
-
-    assert receipt.n_observations == 1
-    _assert_moved(episodes.get(seen.id))
+    assert [each.room_id for each in there.read().waypoints] == [None, None]
+    assert store.read().waypoints[0].room_id == "R3"
 
 
-def test_observations_follow_their_records_also_after_a_crash_between(
-    store: SemanticMapStore, episodes: EpisodeStore, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.usefixtures("memory")
+def test_what_is_aligned_stays_so_for_every_robot_and_every_map(store: SemanticMapStore) -> None:
+    opened(store, MOVED).keeper.realign()
+    opened(store, MOVED_TWICE).keeper.realign()
+
+    for grid, motion in ((MAP, Pose(0.0, 0.0)), (MOVED, MOTION), (MOVED_TWICE, TWICE)):
+        memory = opened(store, grid)
+        sink = memory.read().find_waypoint("sink")
+        assert sink is not None
+        assert sink.pose.point.distance_to((motion @ SINK.pose).point) < 0.05
+        again = memory.keeper.realign()
+        assert again.motion is None
+        assert "Nothing had to be aligned." in say_receipt(again)
+
+
+def test_a_known_place_is_written_in_its_own_frame(
+    memory: FramedMemory, store: SemanticMapStore
 ) -> None:
-    keeper = MapKeeper(store, episodes)
-    keeper.keep(fine(HOUSE))
-    seen = episodes.write(SEEN)
-    with monkeypatch.context() as crashing:
-        crashing.setattr(episodes, "finish_move", _crash)
-        with pytest.raises(KeyboardInterrupt):
-            keeper.realign(moved(fine(HOUSE), MOTION))
+    there = opened(store, MOVED)
+    there.keeper.realign()
 
-    again = MapKeeper(SemanticMapStore(store.path), EpisodeStore(episodes.folder))
-    assert again.finish_move() == 1
-    assert again.finish_move() == 0
+    receipt, _ = there.remember(replace(SINK, pose=MOTION @ Pose(19.0, 8.0, -1.0), room_id="R7"))
 
-    _assert_moved(episodes.get(seen.id))
+    assert receipt.waypoint.room_id == "R7"
+    assert receipt.waypoint.pose.x == pytest.approx((MOTION @ Pose(19.0, 8.0)).x, abs=0.05)
+    kept = memory.read().find_waypoint("sink")
+    assert kept is not None
+    assert kept.pose.x == pytest.approx(19.0, abs=0.05)
+    assert memory.read().elsewhere == ()
 
 
-def test_a_move_that_did_not_come_about_moves_no_observation(
-    store: SemanticMapStore, episodes: EpisodeStore
-) -> None:
-    keeper = MapKeeper(store, episodes)
-    keeper.keep(fine(HOUSE))
-    seen = episodes.write(SEEN)
-    episodes.plan_move(MOTION, to="map-2.yaml")
-
-    assert keeper.finish_move() == 0
-    assert episodes.get(seen.id) == seen
-    episodes.plan_move(MOTION, to="map-3.yaml")
-    assert keeper.realign(fine(HOUSE)).motion is None
-    assert episodes.get(seen.id) == seen
-
-
-def _crash(*, at: str) -> int:
-    """Dies once the records have moved."""
-    if at == FIRST_NAME:
-        return 0
-    raise KeyboardInterrupt
-
-
-def _assert_moved(seen: Observation | None) -> None:
-    assert seen is not None
-    truth = MOTION @ SEEN.pose
-    assert seen.pose.point.distance_to(truth.point) < 0.1
-    assert math.isclose(seen.pose.yaw_rad, truth.yaw_rad, abs_tol=0.01)
-    assert seen.room_id is None
-
-
-def test_the_file_as_it_was_is_kept(keeper: MapKeeper, store: SemanticMapStore) -> None:
+@pytest.mark.usefixtures("memory")
+def test_records_are_not_aligned_with_another_building(store: SemanticMapStore) -> None:
     before = store.path.read_bytes()
 
-    receipt = keeper.realign(moved(fine(HOUSE), MOTION))
-
-    assert receipt.undo_path is not None
-    assert receipt.undo_path.read_bytes() == before
-
-
-def test_moved_records_belong_to_the_new_map_for_good(
-    keeper: MapKeeper, store: SemanticMapStore
-) -> None:
-    new = moved(fine(HOUSE), MOTION)
-    keeper.realign(new)
-
-    again = MapKeeper(SemanticMapStore(store.path)).realign(new)
-
-    assert again.motion is None
-    assert "Nothing had to be moved." in say_receipt(again)
-
-
-def test_there_and_back_again_leaves_the_records_where_they_were(
-    keeper: MapKeeper, store: SemanticMapStore
-) -> None:
-    keeper.realign(moved(fine(HOUSE), MOTION))
-    keeper.realign(fine(HOUSE))
-
-    for waypoint, before in zip(store.read().waypoints, (DOCK, SINK), strict=True):
-        assert waypoint.pose.point.distance_to(before.pose.point) < 0.1
-
-
-def test_records_do_not_move_to_another_building(
-    keeper: MapKeeper, store: SemanticMapStore
-) -> None:
-    before = store.path.read_bytes()
-
-    receipt = keeper.realign(fine(OTHER_HOUSE))
+    receipt = opened(store, OTHER).keeper.realign()
 
     with pytest.raises(SemanticMapError, match="The records stay where they are"):
         say_receipt(receipt)
-
     assert store.path.read_bytes() == before
 
 
-def test_records_without_a_map_cannot_be_moved(store: SemanticMapStore) -> None:
-    with pytest.raises(SemanticMapError, match="No map was kept"):
-        MapKeeper(store).realign(fine(HOUSE))
-
-
-def test_a_map_under_another_name_takes_the_records_over(tmp_path: Path) -> None:
-    old = SemanticMapStore(tmp_path / "places.yaml", map_id="monday")
-    old.write(DOCK)
-    MapKeeper(old).keep(fine(HOUSE))
-    new = SemanticMapStore(tmp_path / "places.yaml", map_id="tuesday")
-
-    MapKeeper(new).realign(moved(fine(HOUSE), MOTION))
-
-    assert new.read().warnings == ()
-    assert new.write(SINK).n_waypoints == 2
-
-
-def test_comments_and_spelling_stay_when_records_move(
-    keeper: MapKeeper, store: SemanticMapStore
+def test_records_without_walls_belong_to_no_map_until_somebody_says_so(
+    store: SemanticMapStore,
 ) -> None:
-    text = store.path.read_text().replace("waypoints:", "# ours\nwaypoints:")
-    store.path.write_text(text.replace("- name: sink", "- name: sink  # the big one"))
+    SemanticMapStore(store.path).write(DOCK)
+    memory = opened(store, MAP)
 
-    keeper.realign(moved(fine(HOUSE), MOTION))
+    assert elsewhere(memory) == ["dock"]
+    with pytest.raises(SemanticMapError, match="No map was kept"):
+        memory.keeper.realign()
+    memory.write(SINK)
+    assert (here(memory), elsewhere(memory)) == (["sink"], ["dock"])
+    assert "map: house" not in store.path.read_text().partition("frames:")[0]
 
-    after = store.path.read_text()
-    assert "# ours\n" in after
-    assert "# the big one" in after
-    assert "snapshot: map-2.yaml" in after
+
+def test_records_without_walls_are_of_the_map_that_their_file_names(
+    store: SemanticMapStore,
+) -> None:
+    store.write(DOCK)
+
+    assert here(opened(store, MAP)) == ["dock"]
+    assert elsewhere(opened(store, MAP, map_id="annex")) == ["dock"]
 
 
-def test_a_damaged_kept_map_is_said(keeper: MapKeeper, store: SemanticMapStore) -> None:
+def test_a_damaged_kept_map_is_said(memory: FramedMemory, store: SemanticMapStore) -> None:
     store.path.with_name("places.memory").joinpath("map.yaml").write_text("nothing\n")
 
     with pytest.raises(SemanticMapError, match="cannot be read"):
-        MapKeeper(store).compare(fine(HOUSE))
-    assert keeper.compare(fine(HOUSE)) is not None
+        opened(store, MAP)
+    assert here(memory) == ["dock", "sink"]

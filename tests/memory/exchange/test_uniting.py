@@ -137,10 +137,19 @@ def test_joining_the_same_again_adds_no_name(first: SemanticMap, second: Semanti
     assert names(unite(once, second).places) == names(once)
 
 
+def test_a_look_that_is_joined_again_misses_nothing_twice() -> None:
+    rack, tap = (Landmark(label=label, bearing_rad=0.0) for label in ("rack", "tap"))
+    first = memory(dock(at=MONDAY, functional_landmarks=(rack,)))
+    second = memory(dock(at=TUESDAY, functional_landmarks=(tap, tap)))
+    once = unite(first, second).places
+    assert [each.n_missed for each in once.waypoints[0].landmarks] == [0, 0, 1]
+    assert unite(once, second).places.waypoints == once.waypoints
+
+
 def test_two_files_become_one_with_the_comments_of_the_first(tmp_path: Path) -> None:
     first, second, out = (tmp_path / name for name in ("a.yaml", "b.yaml", "c.yaml"))
     first.write_text(
-        "# ours\nwaypoints:\n  - name: hall  # big\n    pose: {x: 1, y: 2, yaw_deg: 0}\n"
+        "# ours\nmap: m1\nwaypoints:\n  - name: hall  # big\n    pose: {x: 1, y: 2, yaw_deg: 0}\n"
     )
     SemanticMapStore(second).write(Waypoint(name="yard", pose=Pose(3.0, 4.0), map_id="m1"))
     before = first.read_bytes(), second.read_bytes()
@@ -172,7 +181,7 @@ def test_events_of_both_files_are_there_once_each_under_an_id_of_its_own(tmp_pat
     first, second, out = (tmp_path / f"{name}.yaml" for name in "abc")
     wet = Event(text="the floor is wet", place="C1", effect=Effect.SLOW)
     for path, more in ((first, "painters"), (second, "the lift is out of order")):
-        store = SemanticMapStore(path)
+        store = SemanticMapStore(path, map_id="m1")
         store.write_event(Event(text=more))
         store.write_event(wet)
 

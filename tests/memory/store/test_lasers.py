@@ -9,7 +9,7 @@ from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, LaserFan, Waypoint
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.layout import read_plain_record
-from mapspeak.memory.store.rewriting import moved, with_waypoint
+from mapspeak.memory.store.rewriting import with_waypoint
 
 FAN = "from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m"
 FILE = f"""\
@@ -59,8 +59,8 @@ def test_a_record_written_again_keeps_its_line_and_the_comment_on_it() -> None:
 
 
 def test_ranges_are_the_same_on_a_map_that_has_moved() -> None:
-    there = moved(document(FILE), Pose(3.0, -1.0, math.radians(40)), entries={}).to_map()
-    (place,) = there.waypoints
+    (place,) = document(FILE).to_map().waypoints
+    place = place.moved(Pose(3.0, -1.0, math.radians(40)))
     assert place.pose.yaw_deg == pytest.approx(130.0)
     assert place.landmarks[0].laser == LaserFan.read(FAN)
 

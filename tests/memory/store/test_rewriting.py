@@ -1,4 +1,3 @@
-import math
 import re
 
 import pytest
@@ -10,7 +9,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Waypoint
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.rewriting import bound_to, moved, with_waypoint
+from mapspeak.memory.store.rewriting import bound_to, with_waypoint
 from mapspeak.memory.store.schema import record_data
 from waypoints import waypoints
 
@@ -271,19 +270,6 @@ def test_what_mapspeak_wrote_can_be_updated_to_anything(first: Waypoint, second:
     (back,) = with_waypoint(once, Waypoint(name=first.name, **data)).to_map().waypoints
 
     assert record_data(back) == {**record_data(second), "name": first.name}
-
-
-def test_the_poses_of_views_move_with_their_place_and_back() -> None:
-    motion = Pose(2.0, -1.0, math.pi / 2)
-    tap = Landmark(label="tap", bearing_rad=0.5, pose=Pose(1.0, 2.0, 0.0))
-    dock = Waypoint(name="dock", pose=Pose(3.0, 0.0, 0.0), functional_landmarks=(tap,))
-    before = with_waypoint(document(""), dock)
-
-    after = moved(before, motion, entries={})
-
-    assert "seen_from: {x: 1.00, y: 2.00, yaw_deg: 0.0}" in before.text
-    assert "seen_from: {x: 0.00, y: 0.00, yaw_deg: 90.0}" in after.text
-    assert moved(after, motion.inverse(), entries={}).text == before.text
 
 
 def test_a_pose_that_is_the_places_own_is_not_repeated() -> None:

@@ -3,7 +3,6 @@ import stat
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -47,40 +46,6 @@ def test_a_store_without_a_file_is_an_empty_map_and_makes_none(
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_new_name_creates_a_waypoint(store: SemanticMapStore) -> None:
-    receipt = store.write(place("dock"))
-
-    assert receipt.previous is None
-    assert receipt.waypoint.name == "dock"
-    assert receipt.n_waypoints == 1
-    assert store.read().waypoints == (receipt.waypoint,)
-    assert receipt.waypoint.map_id == "b1"
-
-
-def test_a_known_name_updates_its_waypoint_whatever_its_case(store: SemanticMapStore) -> None:
-    first = store.write(place("Dock", x=1.0)).waypoint
-    store.write(place("hall"))
-
-    receipt = store.write(place(" dock", x=5.0))
-
-    assert receipt.previous is not None
-    assert receipt.previous == first
-    assert receipt.n_waypoints == 2
-    assert names(store) == ["dock", "hall"]
-    assert store.read().waypoints[0].pose.x == 5.0
-
-
-def test_what_one_store_writes_another_reads(store: SemanticMapStore, path: Path) -> None:
-    other = SemanticMapStore(path, map_id="b1")
-    assert names(other) == []
-
-    store.write(place("dock"))
-    assert names(other) == ["dock"]
-
-    other.write(place("hall"))
-    assert names(store) == ["dock", "hall"]
-
-
 def test_an_edit_in_place_of_the_same_size_and_time_is_seen(
     store: SemanticMapStore, path: Path
 ) -> None:
@@ -104,6 +69,26 @@ def test_an_edit_by_hand_is_seen(store: SemanticMapStore, path: Path) -> None:
     assert "name: loading dock  # renamed\n" in path.read_text()
 
 
+def test_a_removed_record_leaves_the_comments_and_blank_lines_around_it(
+    store: SemanticMapStore, path: Path
+) -> None:
+    pose = "    pose: {x: 0, y: 0, yaw_deg: 0}\n"
+    head, tail = f"waypoints:\n  - name: a\n{pose}\n# b:\n", f"\n  - name: c  # mine\n{pose}"
+    path.write_text(f"{head}\n  - name: b  # gone\n{pose}{tail}map: b1\n")
+
+    store.remove("b")
+
+    assert path.read_text() == f"{head}{tail}map: b1\n"
+
+
+def test_a_record_in_a_list_in_brackets_is_not_removed(store: SemanticMapStore, path: Path) -> None:
+    path.write_text("waypoints: [{name: a, pose: {x: 0, y: 0, yaw_deg: 0}}]\n")
+
+    with pytest.raises(SemanticMapError, match="cannot write to it"):
+        store.remove("a")
+    assert names(store) == ["a"]
+
+
 def test_an_unchanged_file_is_not_read_again(store: SemanticMapStore) -> None:
     store.write(place("dock"))
 
@@ -118,58 +103,7 @@ def test_the_folder_is_made_where_it_is_missing(tmp_path: Path) -> None:
     assert names(store) == ["dock"]
 
 
-def test_what_is_remembered_of_a_place_joins_what_was(store: SemanticMapStore) -> None:
-    hose, tap = Landmark(label="hose"), Landmark(label="tap")
-    store.remember(replace(place("dock"), safety_landmarks=(hose,)))
-
-    receipt, merge = store.remember(replace(place("Dock"), functional_landmarks=(tap,)))
-
-    assert [views[0].label for views in merge.kept] == ["hose"]
-    assert receipt.waypoint.landmarks == store.read().waypoints[0].landmarks == (hose, tap)
-    assert receipt.previous is not None
-    assert receipt.previous.landmarks == (hose,)
-
-
-def test_what_two_stores_remember_of_one_place_is_both_there(
-    store: SemanticMapStore, path: Path
-) -> None:
-    other = SemanticMapStore(path, map_id="b1")
-    other.read()
-    for number in range(4):
-        label = Landmark(label=f"thing {number}")
-        writer = store if number % 2 else other
-        writer.remember(replace(place("dock"), functional_landmarks=(label,)))
-
-    labels = {each.label for each in store.read().waypoints[0].landmarks}
-    assert labels == {f"thing {number}" for number in range(4)}
-
-
 # --- maps ------------------------------------------------------------------------------------
-
-
-def test_places_of_another_map_are_read_with_a_warning(path: Path) -> None:
-    SemanticMapStore(path, map_id="b1").write(place("dock"))
-
-    places = SemanticMapStore(path, map_id="b2").read()
-
-    assert places.map_id == "b1"
-    assert [place.name for place in places.waypoints] == ["dock"]
-    (warning,) = places.warnings
-    assert 'belongs to the map "b1", but the robot is on "b2"' in warning
-
-
-def test_nothing_is_written_to_the_file_of_another_map(path: Path) -> None:
-    SemanticMapStore(path, map_id="b1").write(place("dock"))
-    before = path.read_bytes()
-
-    with pytest.raises(SemanticMapError, match=r'"b1", but the robot is on "b2".*another file'):
-        SemanticMapStore(path, map_id="b2").write(place("hall"))
-    assert path.read_bytes() == before
-
-
-def test_a_waypoint_of_another_map_is_not_written(store: SemanticMapStore) -> None:
-    with pytest.raises(SemanticMapError, match='waypoint "dock" belongs to the map "b2"'):
-        store.write(Waypoint(name="dock", pose=Pose(0.0, 0.0), map_id="b2"))
 
 
 def test_a_file_that_names_no_map_takes_the_one_of_its_first_writer(
@@ -182,16 +116,6 @@ def test_a_file_that_names_no_map_takes_the_one_of_its_first_writer(
 
     assert path.read_text().startswith("map: b1\nwaypoints:\n")
     assert {place.map_id for place in store.read().waypoints} == {"b1"}
-
-
-def test_a_store_without_a_map_takes_the_file_for_what_it_says(path: Path) -> None:
-    SemanticMapStore(path, map_id="b1").write(place("dock"))
-    store = SemanticMapStore(path)
-
-    store.write(place("hall"))
-
-    assert store.read().map_id == "b1"
-    assert store.read().warnings == ()
 
 
 # --- files that are wrong --------------------------------------------------------------------

@@ -11,8 +11,9 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, merge_waypoint
 from mapspeak.memory.things.approach import find_approach
 from mapspeak.memory.things.finding import find_things
+from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.sight import build_sight_map
-from mapspeak.memory.things.thing import Category, Thing, name_the_same
+from mapspeak.memory.things.thing import Category, Thing
 from mapspeak.memory.waypoint import Confidence
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from
@@ -380,6 +381,23 @@ def test_what_no_changed_waypoint_touches_is_not_worked_out_again() -> None:
         ("red", "red", True),
         ("소화기", "소화기", True),
         ("!", "!", True),
+        ("gate 3", "gate 4", False),
+        ("gate 3", "gate 03", True),
+        ("gate 3", "gate", True),
+        ("gate B", "gate C", False),
+        ("pump P1", "pump P2", False),
+        ("pump P1", "red pump P1", True),
+        ("left door", "right door", False),
+        ("left door", "door", True),
+        ("rack 1, upper shelf", "rack 1", True),
+        ("2 chairs", "3 chairs", True),
+        ("a box", "box", True),
+        ("1.5 m shelf", "2 m shelf", True),
+        ("first aid kit", "first aid box", True),
+        ("fridge", "refrigerator", True),
+        ("red couch", "sofa", True),
+        ("night stand", "bedside table", True),
+        ("dining table", "tennis table", False),
     ],
 )
 def test_labels_name_the_same_by_their_words(label: str, other: str, *, is_same: bool) -> None:
@@ -436,3 +454,46 @@ def test_what_is_known_of_a_place_with_several_poses_changes_no_answer() -> None
     places = SemanticMap(waypoints=(both,))
     earlier = find_things(SemanticMap(waypoints=(west,)), grid)
     assert find_things(places, grid, earlier=earlier).things == find_things(places, grid).things
+
+
+def test_neighbours_with_numbers_are_things_of_their_own() -> None:
+    grid = drawn(ROOM)
+    at = {f"charger {number}": Point(0.6 + 0.8 * number, 0.2) for number in range(1, 5)}
+    looks = [
+        look(f"{label} {side}", place.x + side, 1.4, (label, place))
+        for label, place in at.items()
+        for side in (-0.4, 0.4)
+    ]
+
+    things = find_things(SemanticMap(waypoints=tuple(looks)), grid).things
+
+    assert sorted(each.label for each in things) == sorted(at)
+    assert all(
+        each.position is not None and each.position.distance_to(at[each.label]) < 0.3
+        for each in things
+    )
+
+
+def test_a_thing_with_two_names_in_one_spot_is_one_thing() -> None:
+    grid = drawn(ROOM)
+    place = Point(0.2, 1.0)
+    looks = [
+        look("a", 1.6, 1.4, ("fridge", place)),
+        look("b", 1.2, 0.6, ("refrigerator", place)),
+        look("c", 1.8, 1.0, ("fridge", place)),
+    ]
+
+    (thing,) = find_things(SemanticMap(waypoints=tuple(looks)), grid).things
+
+    assert (thing.label, thing.other_labels) == ("fridge", ("refrigerator",))
+
+
+def test_labels_are_grouped_as_if_each_was_compared_with_all() -> None:
+    labels = ["sink 1", "sink 2", "red sink 2", "tap", "faucet", "gate", "gate 3", "gate 4"]
+
+    assert sorted(map(sorted, group_names(labels))) == [
+        ["faucet", "tap"],
+        ["gate", "gate 3", "gate 4"],
+        ["red sink 2", "sink 2"],
+        ["sink 1"],
+    ]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.server.text.memory import AHEAD, PAST, read_moment
+from mapspeak.server.text.moments import AHEAD, PAST, read_moment, read_past
 
 NOW = datetime(2026, 11, 23, 12, 0, tzinfo=UTC)
 
@@ -53,8 +53,72 @@ def test_a_span_is_counted_back_for_episodes_unless_it_says_in(
     assert read_moment(written, NOW) == NOW + timedelta(seconds=ahead_s)
 
 
-@pytest.mark.parametrize("written", ["", "yesterday", "in", "in 2h ago", "2x", "9" * 400 + "h"])
+@pytest.mark.parametrize(
+    "written",
+    ["", "in", "in 2h ago", "2x", "7", "13 pm", "25:00", "last", "monday soon", "9" * 400 + "h"],
+)
 def test_what_is_no_time_is_refused_with_what_is_one(written: str) -> None:
     with pytest.raises(SemanticMapError, match="is no time") as error:
         read_moment(written, NOW, is_ahead=True)
     assert AHEAD in error.value.hint
+
+
+MONDAY = datetime(2026, 11, 23, 0, 0, tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    ("written", "begin_h", "end_h"),
+    [
+        ("today", 0, 24),
+        ("Yesterday", -24, 0),
+        ("this morning", 5, 12),
+        ("yesterday afternoon", -12, -6),
+        ("last night", -2, 6),
+        ("Sunday", -24, 0),
+        ("monday", 0, 24),
+        ("last Monday", -168, -144),
+        ("2026-11-22", -24, 0),
+    ],
+)
+def test_a_period_of_the_past_is_the_whole_of_it(
+    written: str, begin_h: float, end_h: float
+) -> None:
+    begin, end = MONDAY + timedelta(hours=begin_h), MONDAY + timedelta(hours=end_h)
+
+    assert read_past(written, None, NOW) == (begin, end)
+    assert read_past(None, written, NOW) == (None, end)
+
+
+@pytest.mark.parametrize(
+    ("written", "hour"),
+    [
+        ("3:15 pm", 15.25),
+        ("3pm", 15),
+        ("12 am", 0),
+        ("12:30 p.m.", 12.5),
+        ("noon", 12),
+        ("last 10 minutes", 12 - 1 / 6),
+        ("the last hour", 11),
+        ("an hour ago", 11),
+        ("yesterday 9:30", -14.5),
+        ("Sunday 22:00", -2),
+        ("2 weeks ago", 12 - 336),
+    ],
+)
+def test_moments_are_read_as_people_say_them(written: str, hour: float) -> None:
+    assert read_past(written, None, NOW) == (MONDAY + timedelta(hours=hour), None)
+
+
+def test_from_a_moment_to_a_period_is_to_its_end() -> None:
+    assert read_past("9:00", "this morning", NOW) == (
+        MONDAY + timedelta(hours=9),
+        MONDAY + timedelta(hours=12),
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "hour"),
+    [("tomorrow 8:00", 32), ("3 pm", 15), ("9 am", 33), ("Tuesday 8:00", 32), ("tonight", 22)],
+)
+def test_a_time_of_an_event_is_still_to_come(written: str, hour: float) -> None:
+    assert read_moment(written, NOW, is_ahead=True) == MONDAY + timedelta(hours=hour)

@@ -5,13 +5,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import GoalCheck, say_refusal
 from mapspeak.places.naming import AmbiguousPlaceError, Place
-from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place
-from mapspeak.places.relations.grammar import Nearest, parse_relation
-from mapspeak.places.relations.proximity import find_all_near
+from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_group, find_place
+from mapspeak.places.relations.grammar import Superlative, parse_relation
+from mapspeak.places.relations.superlatives import find_all_near
 from mapspeak.robot import GoalStatus
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel
@@ -44,7 +46,7 @@ def find_candidates(world: WorldModel, words: str) -> tuple[CheckedGoal, ...]:
 def _find_places(world: WorldModel, words: str) -> list[Place]:
     """Find what words mean; "the nearest door" is nearest on the route, so any door may be it."""
     relation = parse_relation(words)
-    if isinstance(relation, Nearest) and relation.to is None:
+    if isinstance(relation, Superlative) and relation == Superlative(kind=relation.kind):
         near = find_all_near(world, relation.kind)
         if near:
             return list(near)
@@ -86,6 +88,9 @@ def _find_remembered(world: WorldModel, words: str) -> Iterator[Place]:
 
 MOST_STOPS = 20
 
+Asked = tuple[str, tuple[CheckedGoal, ...]]
+"""The words of a stop, and all that they may mean."""
+
 
 class StopState(StrEnum):
     """How it stands with one stop."""
@@ -119,10 +124,12 @@ class RoutePlan:
 
     Attributes:
         greedy_m: The whole length if the nearest candidate were taken each time.
+        left_out: Of "all rooms" and the like, those that the robot cannot get to.
     """
 
     stops: tuple[RouteStop, ...]
     greedy_m: float
+    left_out: tuple[RouteStop, ...] = ()
 
     @property
     def total_m(self) -> float:
@@ -133,19 +140,75 @@ class RoutePlan:
 def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
     """Plan a route past stops in their order, each an id, a name, "x, y" or other words.
 
+    The places of "all rooms" and the like follow one another as they are nearest.
+
     Raises:
         GoalError: There are no stops or too many, one means nothing that can be reached, or no way
             leads from one to the next.
     """
-    if not 1 <= len(stops) <= MOST_STOPS:
+    _require_number(len(stops))
+    legs_m = _Legs(world)
+    asked, left_out = _spread(world, legs_m, stops)
+    _require_number(len(asked))
+    chosen = _choose_shortest(legs_m, asked)
+    legs = zip(asked, chosen, legs_m.along(chosen), strict=True)
+    return RoutePlan(
+        stops=tuple(
+            RouteStop(asked=words, goal=goal, n_candidates=len(candidates), leg_m=leg_m)
+            for (words, candidates), goal, leg_m in legs
+        ),
+        greedy_m=math.fsum(legs_m.along(_choose_greedily(legs_m, asked))),
+        left_out=left_out,
+    )
+
+
+def _require_number(n_stops: int) -> None:
+    if not 1 <= n_stops <= MOST_STOPS:
         raise GoalError(
-            f"A route has 1 to {MOST_STOPS} stops; this one has {len(stops)}.",
+            f"A route has 1 to {MOST_STOPS} stops; this one has {n_stops}.",
             hint="Give the stops in order, as ids, names or phrases.",
         )
-    choices = [_find(world, number, words) for number, words in enumerate(stops)]
-    legs_m = _Legs(world)
+
+
+def _spread(
+    world: WorldModel, legs_m: "_Legs", stops: Sequence[str]
+) -> tuple[list[Asked], tuple[RouteStop, ...]]:
+    """Return each stop with its candidates, and the places of groups that cannot be reached."""
+    asked: list[Asked] = []
+    left_out: list[RouteStop] = []
+    for number, words in enumerate(stops):
+        group = [check_place(world, place) for place in find_group(world, words)]
+        ahead = [goal for goal in group if goal.check.is_ok]
+        if not ahead:
+            asked.append((words, _find(world, number, words)))
+            continue
+        left_out += [_leave_out(goal) for goal in group if not goal.check.is_ok]
+        while ahead:
+            way = asked[-1][1][:1] if asked else ()
+            nearest = ahead.pop(int(np.argmin([legs_m.between(way, goal) for goal in ahead])))
+            asked.append((nearest.name, (nearest,)))
+    return asked, tuple(left_out)
+
+
+def _leave_out(goal: CheckedGoal) -> RouteStop:
+    return RouteStop(
+        asked=goal.name,
+        goal=goal,
+        n_candidates=1,
+        leg_m=0.0,
+        state=StopState.SKIPPED,
+        obstacle=goal.check,
+    )
+
+
+def _choose_shortest(legs_m: "_Legs", asked: Sequence[Asked]) -> tuple[CheckedGoal, ...]:
+    """Return the candidate for each stop with which the whole route is shortest.
+
+    Raises:
+        GoalError: No way leads from one to the next.
+    """
     best: list[tuple[float, tuple[CheckedGoal, ...]]] = [(0.0, ())]
-    for number, candidates in enumerate(choices):
+    for number, (words, candidates) in enumerate(asked):
         best = [
             min(
                 ((spent_m + legs_m.between(way, each), (*way, each)) for spent_m, way in best),
@@ -155,19 +218,11 @@ def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
         ]
         if all(math.isinf(spent_m) for spent_m, _ in best):
             raise GoalError(
-                f"No way leads from stop {number} to stop {number + 1}, {stops[number]}.",
+                f"No way leads from stop {number} to stop {number + 1}, {words}.",
                 hint="Leave one of them out.",
                 step=NextStep.MEASURE_BETWEEN,
             )
-    _, chosen = min(best, key=lambda found: found[0])
-    legs = zip(stops, chosen, choices, legs_m.along(chosen), strict=True)
-    return RoutePlan(
-        stops=tuple(
-            RouteStop(asked=words, goal=goal, n_candidates=len(candidates), leg_m=leg_m)
-            for words, goal, candidates, leg_m in legs
-        ),
-        greedy_m=math.fsum(legs_m.along(_choose_greedily(legs_m, choices))),
-    )
+    return min(best, key=lambda found: found[0])[1]
 
 
 def _find(world: WorldModel, number: int, words: str) -> tuple[CheckedGoal, ...]:
@@ -182,11 +237,9 @@ def _find(world: WorldModel, number: int, words: str) -> tuple[CheckedGoal, ...]
         ) from error
 
 
-def _choose_greedily(
-    legs_m: "_Legs", choices: Sequence[tuple[CheckedGoal, ...]]
-) -> tuple[CheckedGoal, ...]:
+def _choose_greedily(legs_m: "_Legs", asked: Sequence[Asked]) -> tuple[CheckedGoal, ...]:
     way: tuple[CheckedGoal, ...] = ()
-    for candidates in choices:
+    for _, candidates in asked:
         here = way
         way = (*way, min(candidates, key=lambda each: legs_m.between(here, each)))
     return way

@@ -226,10 +226,15 @@ class ToolDriver:
 
     async def recall(self, label: str) -> list[Seen]:
         """Return everything remembered that bears a label, the nearest sightings first."""
-        memory = (await self.tools.demand("get_semantic_data")).report
+        records: list[dict[str, Any]] = []
+        while True:
+            page = (await self.tools.demand("get_semantic_data", from_row=len(records))).report
+            records += page["waypoints"]
+            if not page["waypoints"] or len(records) >= page["n_places"]:
+                break
         found = [
             _seen(record, landmark)
-            for record in memory["waypoints"]
+            for record in records
             for landmark in (*record["safety_landmarks"], *record["functional_landmarks"])
             if label in landmark["label"]
         ]

@@ -1,190 +1,35 @@
-"""The map that records belong to: kept beside their file, compared with the robot's, and followed.
+"""Which of a memory's frames the robot's map is in: told by the walls kept for each of them."""
 
-It is kept as `places.memory/map.yaml` and a picture. The .yaml is what counts. It names its
-picture, whose name says what is in it, so that a crash between the two leaves the pair that was
-there before.
-"""
-
-import math
-import os
-import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from enum import StrEnum
-from pathlib import Path
 
-import numpy as np
-
-from mapspeak.errors import MapError, SemanticMapError
+from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory.alignment.fitting import (
-    LEAST_OVERLAP,
-    LEAST_SHARED_M,
-    Certainty,
-    MapFit,
-    find_fit,
+from mapspeak.memory.alignment.comparing import (
+    LEAST_STILL_AGREEMENT,
+    LEAST_STILL_M,
+    NO_MOTION,
+    MapComparison,
+    MapRelation,
+    compare_maps,
 )
-from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, judge
-from mapspeak.memory.episodes.store import EpisodeStore
-from mapspeak.memory.store.document import MapDocument
-from mapspeak.memory.store.durable import write_synced
-from mapspeak.memory.store.rewriting import moved
-from mapspeak.memory.store.semanticmap import SemanticMapStore
-from mapspeak.spatial import UNKNOWN, OccupancyGrid
-from mapspeak.spatial.mapfiles import load_map, write_map
+from mapspeak.memory.alignment.fitting import LEAST_SHARED_M, Certainty
+from mapspeak.memory.alignment.surfaces import MapSurfaces, judge
+from mapspeak.memory.frames import FrameId, MapFrame
+from mapspeak.memory.store.memorystore import MemoryStore
+from mapspeak.memory.walls import OWN_WALLS
+from mapspeak.memory.waypoint import SemanticMap
+from mapspeak.spatial import OccupancyGrid
 
-FIRST_NAME = "map.yaml"
-
-
-class SnapshotFolder:
-    """The folder with the maps that a memory's poses belong to, or did once."""
-
-    def __init__(self, memory_path: Path) -> None:
-        real = Path(os.path.realpath(memory_path))
-        self.path = real.with_name(f"{real.stem}.memory")
-
-    def load(self, name: str) -> OccupancyGrid | None:
-        """Return a map that was kept; None where there is none of that name.
-
-        Raises:
-            SemanticMapError: It is there, but damaged.
-        """
-        path = self.path / Path(name).name
-        if not path.exists():
-            return None
-        try:
-            return load_map(path).grid
-        except MapError as error:
-            raise SemanticMapError(
-                f"The map that the records belong to cannot be read: {error.message}",
-                hint=f"Take {path} away if it is of no use: the next write keeps a new one.",
-            ) from error
-
-    def keep(self, grid: OccupancyGrid, name: str) -> None:
-        """Write a map in place of the one of that name; it is on the disk when this returns.
-
-        Raises:
-            SemanticMapError: It cannot be written.
-        """
-        grid = _in_three_greys(grid)
-        stem = f"{Path(name).stem}-{zlib.crc32(grid.cells.tobytes()):08x}"
-        with self._explained():
-            self.path.mkdir(exist_ok=True, parents=True)
-            new = self.path / f"{stem}.yaml"
-            picture = write_map(grid, new)
-            for path in (picture, new):
-                with path.open("rb+") as file:
-                    os.fsync(file.fileno())
-            new.replace(self.path / name)
-            for other in self.path.glob(f"{Path(name).stem}-????????.pgm"):
-                if other != picture:
-                    other.unlink(missing_ok=True)
-
-    def free_name(self) -> str:
-        """Return a name for another map that none has yet: map-2.yaml, map-3.yaml, ..."""
-        number = 2
-        while (self.path / f"map-{number}.yaml").exists():
-            number += 1
-        return f"map-{number}.yaml"
-
-    def note(self, name: str, content: bytes) -> Path:
-        """Write any other file into the folder; it is on the disk when this returns."""
-        path = self.path / name
-        with self._explained():
-            write_synced(path, content)
-        return path
-
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except MapError as error:
-            raise SemanticMapError(error.message, hint=error.hint) from error
-        except OSError as error:
-            raise SemanticMapError(
-                f"The map cannot be kept in {self.path}: {error.strerror or error}.",
-                hint="Check that the folder may be written to and has room.",
-            ) from error
-
-
-def _in_three_greys(grid: OccupancyGrid) -> OccupancyGrid:
-    """Return the map with free, occupied and unknown alone: map files know no free cell of 45."""
-    cells = np.where(grid.free, 0, np.where(grid.occupied, 100, UNKNOWN)).astype(np.int8)
-    return OccupancyGrid(
-        cells=cells, resolution_m=grid.resolution_m, origin=grid.origin, stamp_s=grid.stamp_s
-    )
-
-
-NO_MOTION = Pose(0.0, 0.0, 0.0)
-STILL_M, STILL_RAD = 0.1, math.radians(1.0)
-"""A smaller motion is how maps differ from run to run, and no reason to touch records."""
-LEAST_STILL_M, LEAST_STILL_AGREEMENT = 8.0, 0.85
-"""So much is enough where maps agree as they lie: no place had to be looked for."""
-PERHAPS_AGREEMENT = 0.75
-"""Maps that agree less, wherever they are laid, show different places."""
-
-
-class MapRelation(StrEnum):
-    """How the map of the records and the robot's present map go together."""
-
-    SAME = "same"
-    MOVED = "moved"
-    OTHER = "other_building"
-    UNKNOWN = "unknown"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MapComparison:
-    """What a comparison of two maps gives.
-
-    Attributes:
-        as_it_lies: How well they agree when nothing is moved.
-        fit: The best place for the old map, where one had to be looked for.
-        shortest_m: The walls of the map that shows less of them.
-    """
-
-    relation: MapRelation
-    as_it_lies: MapAgreement
-    fit: MapFit | None
-    shortest_m: float
-
-
-def compare_maps(old: OccupancyGrid, new: OccupancyGrid) -> MapComparison:
-    """Compare two maps: whether they show the same building, and in the same frame."""
-    before, after = MapSurfaces(old), MapSurfaces(new)
-    as_it_lies = judge(before, after, NO_MOTION)
-    fit, relation = None, MapRelation.SAME
-    shortest_m = min(before.length_m, after.length_m)
-    is_good = (
-        as_it_lies.agreement_ratio >= LEAST_STILL_AGREEMENT
-        and as_it_lies.overlap_ratio >= LEAST_OVERLAP
-        and as_it_lies.shared_m >= LEAST_STILL_M
-    )
-    if not is_good:
-        relation = MapRelation.UNKNOWN
-        if shortest_m >= LEAST_SHARED_M:
-            fit = find_fit(before, after)
-            relation = _relation_of(fit)
-    return MapComparison(relation=relation, as_it_lies=as_it_lies, fit=fit, shortest_m=shortest_m)
-
-
-def _relation_of(fit: MapFit | None) -> MapRelation:
-    if fit is None:
-        return MapRelation.OTHER
-    if fit.is_sure_enough:
-        is_still = fit.off_m < STILL_M and abs(fit.new_from_old.yaw_rad) < STILL_RAD
-        return MapRelation.SAME if is_still else MapRelation.MOVED
-    is_possible = fit.certainty is Certainty.AMBIGUOUS or (
-        fit.quality.agreement_ratio >= PERHAPS_AGREEMENT
-        and fit.quality.overlap_ratio >= LEAST_OVERLAP
-    )
-    return MapRelation.UNKNOWN if is_possible else MapRelation.OTHER
-
-
+KEY = "snapshot"
+"""What the memory calls the kept map of its own frame."""
 GROWN_RATIO = 0.1
 """A map that shows so much more floor than the kept one is kept in its place."""
-KEY = "snapshot"
+SHRUNK_RATIO = 0.5
+"""A map with so little of the floor of the one before it was begun anew."""
+LEAST_TELLING_M = 2.0
+"""Fewer walls say nothing of whether a map is the one before, grown on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,8 +37,8 @@ class RealignReceipt:
     """What became of records whose map may have moved.
 
     Attributes:
-        motion: From the old frame to the new one; None where nothing was moved.
-        undo_path: The file as it was before.
+        motion: From the old frame to the robot's; None where nothing was aligned.
+        n_waypoints: How many are of a known frame now, and were not before.
     """
 
     comparison: MapComparison
@@ -201,130 +46,315 @@ class RealignReceipt:
     certainty: Certainty | None = None
     n_waypoints: int = 0
     n_events: int = 0
-    n_observations: int = 0
-    undo_path: Path | None = None
 
 
-class MapKeeper:
-    """Keeps the map that a store's records belong to, and compares it with the robot's."""
+class FrameKeeper:
+    """Says which frame the robot's map is in, keeps its walls, and aligns it with others.
 
-    def __init__(self, store: SemanticMapStore, episodes: EpisodeStore | None = None) -> None:
+    Args:
+        name_robot: Names the robot whose maps they are; asked when a frame begins.
+        lock: Held by whoever asks or changes something; may be held twice by one thread. None
+            where only one thread does.
+
+    Attributes:
+        frame: The frame of the robot's map, where `is_placed`.
+        is_placed: False while no map was met, or it is not known which frame it is in.
+        n_maps: How often the robot's map was begun anew.
+    """
+
+    def __init__(
+        self,
+        store: MemoryStore,
+        *,
+        name_robot: Callable[[], str] = str,
+        lock: AbstractContextManager[object] | None = None,
+    ) -> None:
         self._store = store
-        self._episodes = episodes
-        self._folder = SnapshotFolder(store.path)
-        self._loaded: tuple[str, OccupancyGrid] | None = None
-        self._compared: tuple[OccupancyGrid, OccupancyGrid, MapComparison] | None = None
+        self._name_robot = name_robot
+        self._loaded: dict[str, OccupancyGrid] = {}
+        self._compared: dict[str, tuple[OccupancyGrid, OccupancyGrid, MapComparison]] = {}
+        self._lock = lock or nullcontext()
+        self._grid: OccupancyGrid | None = None
+        self._is_assumed = False
+        self._fault: SemanticMapError | None = None
+        self.frame: FrameId = None
+        self.is_placed = False
+        self.n_maps = 0
 
-    def keep(self, grid: OccupancyGrid) -> MapComparison | None:
-        """Keep the robot's map where none is kept or it has grown; to be called after a write.
+    @property
+    def has_met(self) -> bool:
+        """True once the robot's map was met."""
+        return self._grid is not None
 
-        A map with hardly a wall is not kept: it would tell nothing.
+    def meet(self, grid: OccupancyGrid) -> None:
+        """Find out which frame the robot's map is in; it stays there while the map grows.
+
+        Raises:
+            SemanticMapError: The memory or a kept map cannot be read.
+        """
+        with self._lock:
+            before, self._grid = self._grid, grid
+            if before is not None and not _goes_on(before, grid):
+                self.n_maps += 1
+                self.is_placed = False
+            if not self.is_placed:
+                self._place(self._store.read())
+
+    def has_walls(self, frame_id: FrameId) -> bool:
+        """Return True where something tells a frame from others."""
+        name = self._walls_of(frame_id)
+        return name is not None and self._load(name) is not None
+
+    def place(self) -> FrameId:
+        """Return the frame of the robot's map, for a write; begin a new one where none is known.
+
+        The walls of the map are kept where none are or it has grown; of a map with hardly a wall
+        they are not: they would tell nothing.
+
+        Raises:
+            SemanticMapError: A new frame cannot be written.
+        """
+        with self._lock:
+            if self._is_assumed and self.has_walls(self.frame):
+                # Another robot came first: its map counts.
+                self.is_placed = False
+            if not self.is_placed:
+                self._place(self._store.read())
+            if not self.is_placed:
+                self._begin_frame()
+            elif self._grid is not None and _is_worth_keeping(self._grid):
+                try:
+                    is_kept = self._keep(self._grid)
+                except SemanticMapError as fault:
+                    # The record counts for more than the walls; `compare` tells of it.
+                    self._fault = fault
+                else:
+                    return self.frame if is_kept else self.place()
+            return self.frame
+
+    def _keep(self, grid: OccupancyGrid) -> bool:
+        """Keep the walls where none are or they have grown; False where another was quicker."""
+        name = self._walls_of(self.frame)
+        kept = None if name is None else self._load(name)
+        if kept is None:
+            return self._keep_walls(grid, name)
+        if name is not None and self._has_grown(name, kept, grid):
+            self._store.walls.keep(grid, name)
+            self._loaded[name] = grid
+        return True
+
+    def compare(self) -> MapComparison | None:
+        """Compare the robot's map with the first one whose records cannot be used on it.
 
         Returns:
-            How the kept map and this one go together; None where there is none to compare with.
-            When they are not the same, nothing is kept, and a reader should hear of it.
+            None where there is none.
 
         Raises:
-            SemanticMapError: The kept map is damaged, or none can be written.
+            SemanticMapError: A kept map is damaged, or none could be kept with the last write.
         """
-        name = self._name()
-        kept = self._load(name)
-        if kept is None:
-            if MapSurfaces(grid).length_m >= LEAST_STILL_M:
-                self._keep(grid, name)
-            return None
-        comparison = self._compare(kept, grid)
-        has_grown = _floor_m2(grid) > (1 + GROWN_RATIO) * _floor_m2(kept)
-        if comparison.relation is MapRelation.SAME and has_grown:
-            self._keep(grid, name)
-        return comparison
+        with self._lock:
+            grid, fault, self._fault = self._grid, self._fault, None
+            if fault is not None:
+                raise fault
+            if grid is None:
+                return None
+            strange = self._find_strange(self._store.read())
+            return next((self._compare(name, kept, grid) for _, name, kept in strange), None)
 
-    def compare(self, grid: OccupancyGrid) -> MapComparison | None:
-        """Tell how the records' map and the robot's go together; None where none was kept.
+    def realign(self) -> RealignReceipt:
+        """Align the frames of the memory with the robot's map where it is sure how.
+
+        Each frame gets one transform; no record changes.
 
         Raises:
-            SemanticMapError: The kept map is damaged.
+            SemanticMapError: No map was kept, or the memory cannot be written.
         """
-        kept = self._load(self._name())
-        return None if kept is None else self._compare(kept, grid)
+        with self._lock:
+            grid = self._grid
+            if grid is None:
+                raise SemanticMapError("The robot has no map yet.", hint="Wait for one.")
+            self._compared.clear()
+            strange = list(self._find_strange(self._store.read()))
+            if not strange:
+                return self._tell_all_known(grid)
+            receipts = [self._align(frame_id, name, kept) for frame_id, name, kept in strange]
+            aligned = [each for each in receipts if each.motion is not None]
+            return (aligned or receipts)[0]
 
-    def realign(self, grid: OccupancyGrid) -> RealignReceipt:
-        """Move all records to the robot's map where it is sure how; all of them or none.
+    # --- where the robot's map is ------------------------------------------------------------
 
-        The file as it was is kept beside the old map; `undo_path` names it. Nothing moves where
-        the maps do not tell surely enough how one lies on the other: the comparison says so.
+    def _place(self, memory: SemanticMap) -> None:
+        """Find the frame whose kept walls lie as the robot's map shows them."""
+        grid = self._grid
+        for frame_id, name, kept in self._find_kept(memory):
+            if grid is None:
+                continue
+            if self._compare(name, kept, grid).relation is MapRelation.SAME:
+                self.frame, self.is_placed, self._is_assumed = frame_id, True, False
+                return
+        if self._is_own_by_name(memory):
+            self.frame, self.is_placed, self._is_assumed = None, True, True
 
-        Raises:
-            SemanticMapError: No map was kept, or the file cannot be written.
-        """
-        self.finish_move()
-        kept = self._load(self._name())
-        if kept is None:
-            raise SemanticMapError(
-                "No map was kept with these records: where they belong cannot be found out.",
-                hint="Write one of them anew on this map; the map is kept with it.",
-            )
-        comparison = self._compare(kept, grid)
-        if comparison.relation is not MapRelation.MOVED or comparison.fit is None:
-            return RealignReceipt(comparison=comparison)
-        return self._move(grid, comparison, comparison.fit)
+    def _is_own_by_name(self, memory: SemanticMap) -> bool:
+        """Return True where the memory's own frame has no walls, and nothing speaks against it."""
+        if memory.frames.items or self.has_walls(None):
+            return False
+        is_empty = not memory.waypoints and not self._store.read_events()
+        names = (memory.map_id, self._store.map_id)
+        is_named = memory.map_id is not None and (None in names or names[0] == names[1])
+        return is_empty or is_named
 
-    def finish_move(self) -> int:
-        """Move observations that have not followed their records; return how many were moved."""
-        return 0 if self._episodes is None else self._episodes.finish_move(at=self._name())
-
-    def _move(self, grid: OccupancyGrid, comparison: MapComparison, fit: MapFit) -> RealignReceipt:
-        motion = fit.new_from_old
-        old_name, new_name = self._name(), self._folder.free_name()
-        self._folder.keep(grid, new_name)
-        undo_path = self._folder.path / f"before-{new_name}"
-        entries = {KEY: new_name}
-        if self._store.map_id is not None:
-            entries["map"] = self._store.map_id
-
-        def change(document: MapDocument) -> MapDocument:
-            if (document.find_entry(KEY) or FIRST_NAME) != old_name:
-                raise SemanticMapError(
-                    "Somebody else has just moved these records.", hint="Look at them again."
+    def _begin_frame(self) -> None:
+        grid = self._grid
+        walls = None
+        if grid is not None and _is_worth_keeping(grid):
+            walls = self._store.walls.free_name()
+            self._store.walls.keep(grid, walls)
+        frames = self._store.write_frames(
+            lambda known: known.added(
+                MapFrame(
+                    id=known.free_id(),
+                    map_id=self._store.map_id,
+                    robot=self._name_robot() or None,
+                    walls=walls,
                 )
-            self._folder.note(undo_path.name, document.content)
-            return moved(document, motion, entries=entries)
+            )
+        )
+        self.frame, self.is_placed, self._is_assumed = frames.items[-1].id, True, False
 
-        if self._episodes is not None:
-            self._episodes.plan_move(motion, to=new_name)
-        _, after = self._store.rewrite(change)
-        self._loaded = None
-        n_observations = self.finish_move()
+    # --- other frames ------------------------------------------------------------------------
+
+    def _align(self, frame_id: FrameId, name: str, kept: OccupancyGrid) -> RealignReceipt:
+        grid = self._grid
+        assert grid is not None  # noqa: S101 - asked for after it was met
+        comparison = self._compare(name, kept, grid)
+        fit = comparison.fit
+        if comparison.relation is not MapRelation.MOVED or fit is None:
+            return RealignReceipt(comparison=comparison)
+        here, n_before = self.place(), self._count_known()
+        memory = self._store.read()
+        if memory.frames.find_transform(of=frame_id, into=here) is None:
+            self._store.write_frames(
+                lambda known: known.aligned(frame_id, here, motion=fit.new_from_old)
+            )
+        n_after = self._count_known()
         return RealignReceipt(
             comparison=comparison,
-            motion=motion,
+            motion=fit.new_from_old,
             certainty=fit.certainty,
-            n_waypoints=len(after.records),
-            n_events=len(after.events),
-            n_observations=n_observations,
-            undo_path=undo_path,
+            n_waypoints=n_after[0] - n_before[0],
+            n_events=n_after[1] - n_before[1],
         )
 
-    def _name(self) -> str:
-        return self._store.read_entry(KEY) or FIRST_NAME
+    def _count_known(self) -> tuple[int, int]:
+        """Return how many waypoints and events are of frames that are aligned with the map."""
+        memory = self._store.read()
+
+        def is_known(frame_id: FrameId) -> bool:
+            return memory.frames.find_transform(of=frame_id, into=self.frame) is not None
+
+        return (
+            sum(is_known(each.frame) for each in memory.waypoints),
+            sum(is_known(each.frame) for each in self._store.read_events()),
+        )
+
+    def _tell_all_known(self, grid: OccupancyGrid) -> RealignReceipt:
+        memory = self._store.read()
+        is_known = self._count_known()[0] == len(memory.waypoints)
+        name = self._walls_of(self.frame) if self.is_placed else None
+        kept = None if name is None else self._load(name)
+        if name is None or kept is None or not is_known:
+            raise SemanticMapError(
+                "No map was kept with these records, or with some of them: where they belong "
+                "cannot be found out.",
+                hint="If they are of this map, let the file say so, as in `map: house`.",
+            )
+        return RealignReceipt(comparison=self._compare(name, kept, grid))
+
+    def _find_strange(self, memory: SemanticMap) -> Iterator[tuple[FrameId, str, OccupancyGrid]]:
+        """Return the frames with walls that are not aligned with the robot's map."""
+        for frame_id, name, kept in self._find_kept(memory):
+            motion = memory.frames.find_transform(of=frame_id, into=self.frame)
+            if not self.is_placed or motion is None:
+                yield frame_id, name, kept
+
+    def _find_kept(self, memory: SemanticMap) -> Iterator[tuple[FrameId, str, OccupancyGrid]]:
+        """Return the frames of which walls are kept, the memory's own first."""
+        named = ((frame.id, frame.walls) for frame in memory.frames.items)
+        for frame_id, name in ((None, self._walls_of(None)), *named):
+            kept = None if name is None else self._load(name)
+            if name is not None and kept is not None:
+                yield frame_id, name, kept
+
+    # --- kept walls --------------------------------------------------------------------------
+
+    def _walls_of(self, frame_id: FrameId) -> str | None:
+        if frame_id is None:
+            return self._store.read_entry(KEY) or OWN_WALLS
+        frame = self._store.read().frames.by_id.get(frame_id)
+        return None if frame is None else frame.walls
+
+    def _keep_walls(self, grid: OccupancyGrid, name: str | None) -> bool:
+        """Keep walls for the first time; False where another was quicker."""
+        kept_as = name or self._store.walls.free_name()
+        if not self._store.walls.keep(grid, kept_as, is_first=True):
+            return False
+        self._loaded[kept_as] = grid
+        self._is_assumed = False
+        if name is None and self.frame is not None:
+            frame_id = self.frame
+            self._store.write_frames(lambda known: known.changed(frame_id, walls=kept_as))
+        return True
+
+    def _has_grown(self, name: str, kept: OccupancyGrid, grid: OccupancyGrid) -> bool:
+        """Return True where the robot's map shows more than the kept one, and nothing else."""
+        if _floor_m2(grid) <= (1 + GROWN_RATIO) * _floor_m2(kept):
+            return False
+        is_small = MapSurfaces(kept).length_m < LEAST_SHARED_M
+        return is_small or self._compare(name, kept, grid).relation is MapRelation.SAME
 
     def _load(self, name: str) -> OccupancyGrid | None:
-        if self._loaded is None or self._loaded[0] != name:
-            grid = self._folder.load(name)
-            self._loaded = None if grid is None else (name, grid)
-        return None if self._loaded is None else self._loaded[1]
+        if name not in self._loaded:
+            grid = self._store.walls.load(name)
+            if grid is None:
+                return None
+            self._loaded[name] = grid
+        return self._loaded[name]
 
-    def _keep(self, grid: OccupancyGrid, name: str) -> None:
-        self._folder.keep(grid, name)
-        self._loaded = (name, grid)
-
-    def _compare(self, kept: OccupancyGrid, grid: OccupancyGrid) -> MapComparison:
-        known = self._compared
-        if known is not None and known[0] is kept and known[1] is grid:
+    def _compare(self, name: str, kept: OccupancyGrid, grid: OccupancyGrid) -> MapComparison:
+        known = self._compared.get(name)
+        if known is not None and known[0] is kept and _is_nearly(known[1], grid, known[2]):
             return known[2]
         comparison = compare_maps(kept, grid)
-        self._compared = (kept, grid, comparison)
+        self._compared[name] = (kept, grid, comparison)
         return comparison
+
+
+def _goes_on(before: OccupancyGrid, grid: OccupancyGrid) -> bool:
+    """Return True where a map is the one before it, perhaps grown: its frame is the same."""
+    if grid is before:
+        return True
+    if _floor_m2(grid) < SHRUNK_RATIO * _floor_m2(before):
+        return False
+    old, new = MapSurfaces(before), MapSurfaces(grid)
+    if old.length_m < LEAST_TELLING_M:
+        return True
+    agreement = judge(old, new, NO_MOTION)
+    is_told = agreement.shared_m >= min(LEAST_TELLING_M, old.length_m / 2)
+    return is_told and agreement.agreement_ratio >= LEAST_STILL_AGREEMENT
+
+
+def _is_nearly(before: OccupancyGrid, grid: OccupancyGrid, told: MapComparison) -> bool:
+    """Return True where looking for another place of a kept map again would find none."""
+    if grid is before:
+        return True
+    if told.relation is MapRelation.SAME or before.origin != grid.origin:
+        return False
+    return abs(_floor_m2(grid) - _floor_m2(before)) <= GROWN_RATIO * _floor_m2(before)
+
+
+def _is_worth_keeping(grid: OccupancyGrid) -> bool:
+    return MapSurfaces(grid).length_m >= LEAST_STILL_M
 
 
 def _floor_m2(grid: OccupancyGrid) -> float:

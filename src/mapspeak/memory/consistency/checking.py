@@ -9,9 +9,11 @@ import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
+from mapspeak.memory.consistency.unseen import check_unseen
 from mapspeak.memory.things.finding import Things
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.sight import BODY_M, OWN_M
-from mapspeak.memory.things.thing import NOISE, Thing, name_the_same
+from mapspeak.memory.things.thing import NOISE, Thing
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray
@@ -108,9 +110,6 @@ def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: floa
 TWIN_M = 0.3
 TWIN_RAD = math.radians(15)
 ONE_PLACE_M = 0.5
-NEAR_M = 4.0
-"""From no farther, who looks at a thing would name it."""
-CONE_MARGIN_RAD = math.radians(5)
 
 
 def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
@@ -143,8 +142,7 @@ def check_things(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
                 things=(thing,),
                 view=view,
             )
-    for waypoint in places.waypoints:
-        yield from _not_seen(found, waypoint, placed, at)
+    yield from check_unseen(places, found, placed, at)
 
 
 def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFinding]:
@@ -158,34 +156,6 @@ def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFindi
                     waypoints=(*other.waypoints, *thing.waypoints),
                     things=(other, thing),
                 )
-
-
-def _not_seen(
-    found: Things, waypoint: Waypoint, placed: Sequence[Thing], at: FloatArray
-) -> Iterator[MemoryFinding]:
-    """Return things in plain sight between what a waypoint names, which it does not name."""
-    seen = waypoint.standpoints[0].landmarks
-    bearings = [each.bearing_rad for each in seen if each.bearing_rad is not None]
-    if len(bearings) < 2:
-        return
-    low, high = min(bearings) - CONE_MARGIN_RAD, max(bearings) + CONE_MARGIN_RAD
-    pose = waypoint.pose
-    for i in np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist():
-        thing = placed[i]
-        assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
-        bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
-        is_named = any(name_the_same(each.label, thing.label) for each in waypoint.landmarks)
-        if (
-            low <= bearing_rad <= high
-            and not is_named
-            and found.is_in_plain_sight(waypoint, thing.position)
-        ):
-            yield MemoryFinding(
-                kind=FindingKind.NOT_SEEN,
-                waypoints=(waypoint.name,),
-                things=(thing,),
-                far_m=pose.point.distance_to(thing.position),
-            )
 
 
 def _labels(waypoint: Waypoint) -> list[str]:

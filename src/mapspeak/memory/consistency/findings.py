@@ -45,6 +45,12 @@ Of two labels in one place that nobody names together, both are right one time i
 either loses depends on how well the other is seen."""
 
 
+SEEN_ODDS = 20.0
+"""That a thing is where it was last seen, at the most, once a later look did not show it."""
+MISSED_WEIGHT = 0.25
+"""What each such look multiplies the odds by: an eye misses about one thing in five."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MemoryFinding:
     """Something odd about what is remembered.
@@ -56,6 +62,7 @@ class MemoryFinding:
         radius_m: Of the robot that cannot get there.
         told_m: How far away the landmark was told to be.
         open_m: How far the line to the landmark leads over free floor.
+        n_since: How many looks later than the last one that saw the thing it stands for.
     """
 
     kind: FindingKind
@@ -69,6 +76,7 @@ class MemoryFinding:
     far_m: float | None = None
     told_m: float | None = None
     open_m: float | None = None
+    n_since: int = 0
 
     @property
     def weight(self) -> float:
@@ -111,8 +119,11 @@ def judge_trust(thing: Thing, findings: Iterable[MemoryFinding]) -> Trust:
     for finding in findings:
         share = _share(thing, finding)
         if share and finding.weight < 1.0:
-            odds *= finding.weight_for(thing) ** share
+            odds *= 1.0 if finding.n_since else finding.weight_for(thing) ** share
             against.append(finding)
+    n_since = sum(finding.n_since for finding in against)
+    if n_since:
+        odds = min(odds, SEEN_ODDS) * MISSED_WEIGHT**n_since
     return Trust(odds / (1 + odds), tuple(against), thing)
 
 

@@ -2,8 +2,8 @@
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 
@@ -94,6 +94,14 @@ class EpisodeOrder(StrEnum):
     NEAREST = "nearest"
 
 
+@dataclass(frozen=True, slots=True)
+class MapPlacing:
+    """How poses of a map are moved into the one that is asked about."""
+
+    map_id: str | None
+    motion: Pose
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeQuery:
     """Which observations are wanted: those that pass every filter that is given.
@@ -102,6 +110,8 @@ class EpisodeQuery:
         near: Near to a place in the map frame; or to where the first observation of another query
             was made, and then without the observations that the other query's words or label fit.
         label: A thing seen, whatever its case.
+        placings: How maps lie to the one that is asked about; what is of no map among them is
+            nowhere near. None takes all poses as they are.
         order: Which come first; None for the best where words are given, else the nearest where a
             place is given without a radius, else the newest.
         as_of: Only the first so many that were ever written, so that pages do not shift.
@@ -120,6 +130,7 @@ class EpisodeQuery:
     label: str | None = None
     kind: ObservationKind | None = None
     map_id: str | None = None
+    placings: tuple[MapPlacing, ...] | None = None
     order: EpisodeOrder | None = None
     limit: int = 20
     offset: int = 0
@@ -165,6 +176,7 @@ class EpisodeMatch:
         fitting: Which of its words fit; those asked for, where meanings were compared.
         label: The one asked for, as it stands there.
         near_id: The observation that a nested query found there; None without one.
+        is_elsewhere: Its pose is on another map, and where that lies is not known.
     """
 
     observation: Observation
@@ -175,6 +187,18 @@ class EpisodeMatch:
     label: str | None = None
     near: Point | None = None
     near_id: str | None = None
+    is_elsewhere: bool = False
+
+
+def placed(seen: Observation, placings: Iterable[MapPlacing] | None) -> EpisodeMatch:
+    """Return an observation with its pose on the map that is asked about, where that is known."""
+    for placing in placings or ():
+        if placing.map_id == seen.map_id:
+            is_still = placing.motion == Pose(0.0, 0.0)
+            room_id = seen.room_id if is_still else None
+            here = replace(seen, pose=placing.motion @ seen.pose, room_id=room_id)
+            return EpisodeMatch(observation=here)
+    return EpisodeMatch(observation=seen, is_elsewhere=placings is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,7 @@
 """Find observations in the database: every filter at once, in SQL."""
 
 import json
+import math
 import sqlite3
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -8,7 +9,7 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.episodes.observation import (
     EpisodeFilter,
     EpisodeMatch,
@@ -27,6 +28,7 @@ MOST_TEXTS = 2000
 """How many different texts, the best ones, one query looks at."""
 
 
+_PLAIN = "(SELECT *, 0 AS is_elsewhere, x AS here_x, y AS here_y FROM observations) AS o"
 COLUMNS = (
     "o.id, o.recorded_us, o.offset_s, o.stamp_s, o.map_id, o.x, o.y, o.yaw_rad, o.room_id, "
     "o.kind, o.text, o.labels, o.picture"
@@ -55,6 +57,44 @@ class _Where:
         return " AND ".join(self.conditions)
 
 
+def _source(query: EpisodeQuery) -> str:
+    """Return the table to ask: poses moved into the map that is asked about.
+
+    Where they are on no map that is known there, `here_x` and `here_y` are null, so that nothing
+    compares with them.
+    """
+    if query.placings is None:
+        return _PLAIN
+    cases = {"x": "", "y": "", "yaw_rad": "", "room_id": ""}
+    known = []
+    for placing in query.placings:
+        m, name = placing.motion, _quoted(placing.map_id)
+        cos, sin = math.cos(m.yaw_rad), math.sin(m.yaw_rad)
+        is_still = m == Pose(0.0, 0.0)
+        known.append(f"map_id IS {name}")
+        moved = {
+            "x": f"{m.x!r} + {cos!r} * x - {sin!r} * y",
+            "y": f"{m.y!r} + {sin!r} * x + {cos!r} * y",
+            "yaw_rad": f"yaw_rad + {m.yaw_rad!r}",
+            "room_id": "room_id" if is_still else "NULL",
+        }
+        for column, value in moved.items():
+            cases[column] += f" WHEN map_id IS {name} THEN {column if is_still else value}"
+    rest = "n, id, recorded_us, offset_s, stamp_s, map_id, kind, text, labels, picture, text_id"
+    here = ", ".join(f"CASE{cases[axis]} ELSE NULL END AS here_{axis}" for axis in ("x", "y"))
+    moved_columns = ", ".join(
+        f"CASE{case} ELSE {name} END AS {name}" for name, case in cases.items()
+    )
+    return (
+        f"(SELECT {rest}, {moved_columns}, {here}, "  # noqa: S608 - our own numbers, quoted names
+        f"NOT ({' OR '.join(known)}) AS is_elsewhere FROM observations) AS o"
+    )
+
+
+def _quoted(text: str | None) -> str:
+    return "NULL" if text is None else "'" + text.replace("'", "''") + "'"
+
+
 class EpisodeSearch:
     """Questions to the database; texts that were read are kept, for they never change."""
 
@@ -76,11 +116,14 @@ class EpisodeSearch:
             query = replace(query, as_of=newest or 0)
         near, anchor = query.near, None
         if isinstance(near, EpisodeQuery):
-            anchor = next(iter(self.find(connection, replace(near, limit=1), rank).matches), None)
+            wanted = replace(near, limit=1, placings=query.placings)
+            anchor = next(iter(self.find(connection, wanted, rank).matches), None)
             if anchor is None:
                 return EpisodePage(matches=(), n_matches=0)
             where = _filters(query, anchor.observation.pose.point)
-            if query.map_id is None:
+            if anchor.is_elsewhere:
+                query = replace(query, placings=None)
+            if query.map_id is None and query.placings is None:
                 # The metres of other maps are others.
                 where.add("o.map_id IS ?", anchor.observation.map_id)
             _leave_out(connection, where, near, anchor)
@@ -89,7 +132,7 @@ class EpisodeSearch:
             where = _filters(query, near)
         scores = None
         if query.words is not None:
-            scores = self._score(connection, query.words, where, rank)
+            scores = self._score(connection, query, where, rank)
         n_matches, rows = _select(connection, query, near, where, scores)
         behind = query.offset + query.limit
         return EpisodePage(
@@ -100,11 +143,12 @@ class EpisodeSearch:
         )
 
     def _score(
-        self, connection: sqlite3.Connection, words: str, where: _Where, rank: Rank | None
+        self, connection: sqlite3.Connection, query: EpisodeQuery, where: _Where, rank: Rank | None
     ) -> dict[int, float]:
         """Return the best texts of what passes the other filters: their ids with scores above 0."""
+        words = query.words or ""
         is_filtered = len(where.conditions) > 2  # beside the state asked for
-        passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
+        passing = f"SELECT o.text_id FROM {_source(query)} WHERE {where.text}"  # noqa: S608 - our own conditions
         among = np.unique(read_ids(connection, passing, where.values)) if is_filtered else None
         if rank is None:
             scores = score_words(connection, words)
@@ -153,9 +197,9 @@ def _select(
     where: _Where,
     scores: Mapping[int, float] | None,
 ) -> tuple[int, sqlite3.Cursor]:
-    source, score, scored, values = "observations AS o", "NULL", "", where.values
+    source, score, scored, values = _source(query), "NULL", "", where.values
     if scores is not None:
-        source, score = "scored JOIN observations AS o USING (text_id)", "scored.score"
+        source, score = f"scored JOIN {source} USING (text_id)", "scored.score"
         scored = (
             "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
             "json_extract(value, '$[1]') AS score FROM json_each(?))"
@@ -165,7 +209,7 @@ def _select(
     counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
     n_matches = connection.execute(counted, values).fetchone()[0]
     rows = connection.execute(
-        f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
+        f"{scored} SELECT {COLUMNS}, o.is_elsewhere, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
         f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
         "LIMIT ? OFFSET ?",
         [*values, query.limit, query.offset],
@@ -198,6 +242,7 @@ def _match(
         observation=observation,
         score_ratio=row["score"],
         distance_m=None if near is None else observation.pose.point.distance_to(near),
+        is_elsewhere=bool(row["is_elsewhere"]),
         filters=tuple(each for each, value in given.items() if value is not None),
         fitting=tuple(fitting),
         label=next((each for each in observation.labels if name_key(each) == key), None),
@@ -211,8 +256,8 @@ def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
     where.add("o.n <= ?", query.as_of)
     if near is not None and query.radius_m is not None:
         r = query.radius_m
-        where.add("o.x BETWEEN ? AND ?", near.x - r, near.x + r)
-        where.add("o.y BETWEEN ? AND ?", near.y - r, near.y + r)
+        where.add("o.here_x BETWEEN ? AND ?", near.x - r, near.x + r)
+        where.add("o.here_y BETWEEN ? AND ?", near.y - r, near.y + r)
         where.add(f"{_squared_m2(near)} <= ?", r * r)
     if query.since is not None:
         where.add("o.recorded_us >= ?", microseconds_of(query.since))
@@ -230,7 +275,7 @@ def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
 
 def _squared_m2(near: Point) -> str:
     x, y = float(near.x), float(near.y)
-    return f"((o.x - {x!r}) * (o.x - {x!r}) + (o.y - {y!r}) * (o.y - {y!r}))"
+    return f"((o.here_x - {x!r}) * (o.here_x - {x!r}) + (o.here_y - {y!r}) * (o.here_y - {y!r}))"
 
 
 def observation_from(row: sqlite3.Row) -> Observation:
@@ -240,7 +285,7 @@ def observation_from(row: sqlite3.Row) -> Observation:
     return Observation(
         id=row["id"],
         recorded_at=time,
-        pose=Pose(row["x"], row["y"], row["yaw_rad"]),
+        pose=Pose(row["x"], row["y"], wrap_angle(row["yaw_rad"])),
         kind=ObservationKind(row["kind"]),
         text=row["text"],
         labels=tuple(json.loads(row["labels"])),

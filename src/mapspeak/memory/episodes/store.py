@@ -5,7 +5,6 @@ Reading and writing are synchronous, and safe between processes and threads.
 
 import contextlib
 import json
-import math
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterable
@@ -15,8 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.installation import shell_command
+from mapspeak.geometry import Pose
 from mapspeak.memory.episodes.database import EpisodeDatabase
 from mapspeak.memory.episodes.observation import (
     EpisodePage,
@@ -109,8 +107,14 @@ class EpisodeStore:
         with self.database.writing() as connection:
             return sum(_insert(connection, each, None) for each in observations)
 
-    def take_over(self, other: "EpisodeStore") -> tuple[int, int]:
-        """Keep all of another store, or none; return how many observations and pictures are new."""
+    def take_over(
+        self, other: "EpisodeStore", *, rename_map: Callable[[str | None], str | None]
+    ) -> tuple[int, int]:
+        """Keep all of another store, or none; return how many observations and pictures are new.
+
+        Args:
+            rename_map: Tells what the map of an observation is called here.
+        """
         if not other.database.exists():
             return 0, 0
         selection = f"SELECT {COLUMNS} FROM observations AS o ORDER BY o.n"  # noqa: S608 - our own columns
@@ -120,7 +124,8 @@ class EpisodeStore:
             for seen in map(observation_from, source.execute(selection)):
                 path = other.picture_path(seen) if seen.kind is ObservationKind.PICTURE else None
                 content = None if path is None else path.read_bytes()
-                if not _insert(connection, seen, None if content is None else len(content)):
+                named = replace(seen, map_id=rename_map(seen.map_id))
+                if not _insert(connection, named, None if content is None else len(content)):
                     continue
                 n_new += 1
                 if path is not None and content is not None:
@@ -157,49 +162,6 @@ class EpisodeStore:
     def picture_path(self, observation: Observation) -> Path | None:
         """Return the file of an observation's picture; None without one."""
         return self._pictures.find(observation.picture)
-
-    # --- moving with the map ----------------------------------------------------------------
-
-    def plan_move(self, motion: Pose, *, to: str) -> None:
-        """Note how poses move if the kept map becomes another one.
-
-        Args:
-            motion: From the frame of their poses to the new one.
-            to: The name of the map that would be kept.
-        """
-        if self.database.exists():
-            with self.database.writing() as connection:
-                plan = json.dumps([motion.x, motion.y, motion.yaw_rad])
-                _note_fact(connection, _PLAN + to, plan)
-
-    def finish_move(self, *, at: str) -> int:
-        """Move all poses if that was planned for the map that is kept now; forget other plans.
-
-        Rooms of the old map are left away: their ids mean nothing on the new one.
-        """
-        if not self.has_plans():
-            return 0
-        with self.database.writing() as connection:
-            plan = _fact(connection, _PLAN + at)
-            connection.execute("DELETE FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
-            if not plan:
-                return 0
-            motion = Pose(*json.loads(plan))
-            cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-            connection.create_function("turned", 1, lambda yaw: wrap_angle(yaw + motion.yaw_rad))
-            return connection.execute(
-                "UPDATE observations SET room_id = NULL, yaw_rad = turned(yaw_rad),"
-                " x = ? + ? * x - ? * y, y = ? + ? * x + ? * y",
-                (motion.x, cos, sin, motion.y, sin, cos),
-            ).rowcount
-
-    def has_plans(self) -> bool:
-        """Return True where a move was planned and neither done nor dropped."""
-        if not self.database.exists():
-            return False
-        with self.database.reading() as connection:
-            found = connection.execute("SELECT 1 FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
-            return found.fetchone() is not None
 
     # --- keeping order -----------------------------------------------------------------------
 
@@ -325,29 +287,30 @@ class BroughtOver:
     n_pictures: int = 0
 
 
-def bring_over(*memories: Path, to: Path) -> BroughtOver:
-    """Copy the observations of some semantic map files, with their pictures, for another one.
+def bring_over(
+    first: Path, second: Path, *, to: Path, rename_map: Callable[[str | None], str | None]
+) -> BroughtOver:
+    """Copy the observations of two semantic map files, with their pictures, for another one.
 
     All of them or none; those of the memories stay as they are.
+
+    Args:
+        rename_map: Tells what a map of the second's observations is called in the new one.
 
     Raises:
         SemanticMapError: It has some, or they cannot be read or written.
     """
-    sources = [EpisodeStore(memory_folder(path)) for path in memories]
-    for source in sources:
-        if source.has_plans():
-            raise SemanticMapError(
-                f"The observations in {source.folder} have not followed their map yet.",
-                hint=f"Start `{shell_command('serve --memory FILE')}` with it once, then merge "
-                "again.",
-            )
+    mine, theirs = (EpisodeStore(memory_folder(path)) for path in (first, second))
     folder = memory_folder(to)
     if folder.exists():
         message = f"{folder} is there already."
         raise SemanticMapError(message, hint="Give the new file another name, or remove it.")
     target = EpisodeStore(folder)
     try:
-        came = [target.take_over(source) for source in sources]
+        came = [
+            target.take_over(mine, rename_map=lambda map_id: map_id),
+            target.take_over(theirs, rename_map=rename_map),
+        ]
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise

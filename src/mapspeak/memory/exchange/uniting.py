@@ -1,19 +1,29 @@
 """Two memories of one map as one, and their files."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.memory.alignment.keeping import KEY
 from mapspeak.memory.episodes.store import BroughtOver, bring_over
+from mapspeak.memory.exchange.mounting import mount, renamed
+from mapspeak.memory.frames import Frames
 from mapspeak.memory.merging import merge_waypoint
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile
-from mapspeak.memory.store.rewriting import bound_to, with_event, with_waypoint
+from mapspeak.memory.store.memorystore import MemoryStore
+from mapspeak.memory.store.rewriting import (
+    with_entry,
+    with_event,
+    with_frames,
+    with_waypoints,
+)
 from mapspeak.memory.store.schema import record_data
 from mapspeak.memory.store.semanticmap import SemanticMapStore
+from mapspeak.memory.walls import OWN_WALLS, WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 SAME_PLACE_M = 1.0
@@ -56,10 +66,11 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
     for place in second.waypoints:
         key = name_key(place.name)
         mine = places.get(key)
+        theirs = place if mine is None else _in_frame_of(mine, place, first.frames)
         if mine is None:
             places[key] = place
-        elif record_data(mine) != record_data(place):
-            joined, said = _join(mine, place)
+        elif theirs is None or record_data(mine) != record_data(theirs):
+            joined, said = (None, APART) if theirs is None else _join(mine, theirs)
             if joined is None:
                 joined = _renamed(place, places, taken)
                 said = f"{said}: both stay, the second one as '{joined.name}'"
@@ -73,6 +84,17 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
         changed=tuple(p for p in united if before.get(name_key(p.name)) != record_data(p)),
         findings=tuple(findings),
     )
+
+
+APART = "nobody knows how the one's map lies to the other's"
+
+
+def _in_frame_of(mine: Waypoint, theirs: Waypoint, frames: Frames) -> Waypoint | None:
+    """Return a place with its poses in the frame of another; None where that is not known."""
+    if theirs.frame == mine.frame:
+        return theirs
+    motion = frames.find_transform(of=theirs.frame, into=mine.frame)
+    return None if motion is None else replace(theirs.moved(motion), frame=mine.frame)
 
 
 def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
@@ -129,53 +151,60 @@ def _renamed(place: Waypoint, places: Mapping[str, Waypoint], taken: Collection[
 # --- files -----------------------------------------------------------------------------------
 
 
-def merge_into(store: SemanticMapStore, second: SemanticMap) -> Union:
-    """Join a memory into a semantic map file, all of it or nothing (see `unite`).
+def merge_into(store: MemoryStore, second: SemanticMap) -> Union:
+    """Join a memory into another, all of it or nothing (see `unite`).
 
     Raises:
         SemanticMapError: The maps differ, or the file has a fault or cannot be written.
     """
     unions: list[Union] = []
 
-    def change(document: MapDocument) -> MapDocument:
-        unions.append(unite(document.to_map(), second))
-        return _with_places(document, unions[-1])
+    def change(first: SemanticMap) -> Iterable[Waypoint]:
+        unions.append(unite(first, second))
+        return unions[-1].changed
 
-    store.rewrite(change)
+    store.write_all(change)
     return unions[-1]
 
 
 def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, BroughtOver]:
     """Write two semantic map files as one: the first with its comments, and what it lacks.
 
+    Their maps are aligned by the walls kept beside them; where these do not tell, the second's
+    records stay in a frame of their own.
     Events of the second one get ids of their own; what is in both is there once. The observations
     of both come along, with their pictures.
 
     Raises:
-        SemanticMapError: One cannot be read, the maps differ, or the new file is there already.
+        SemanticMapError: One cannot be read, or the new file is there already.
     """
     if out.exists():
         message = f"{out} is there already."
         raise SemanticMapError(message, hint="Name a file that is not, or remove it.")
     document, other = _read(first), _read(second)
-    union = unite(document.to_map(), other.to_map())
+    mounted = mount(document, other, paths=(first, second))
+    other = renamed(other, mounted.ids)
+    union = unite(replace(document.to_map(), frames=mounted.frames), other.to_map())
     # All that the first file says besides places stays: comments, people's own keys.
-    whole = _with_places(document, union)
+    whole = with_waypoints(with_frames(document, mounted.frames), union.changed)
     for record in other.events.values():
         nameless = replace(record.event, id="")
         if nameless not in (replace(each.event, id="") for each in whole.events.values()):
             whole, _ = with_event(whole, nameless)
     # First, so that no file says what its observations lack.
-    came = bring_over(first, second, to=out)
+    came = bring_over(
+        first,
+        second,
+        to=out,
+        rename_map=lambda name: mounted.rename_map(name, whole_map_id=document.map_id),
+    )
+    for name, grid in mounted.walls.items():
+        WallFolder(out).keep(grid, name)
+    if whole.find_entry(KEY) is not None:
+        whole = with_entry(whole, KEY, OWN_WALLS)
     SemanticMapStore(out).rewrite(lambda _: whole)
-    return union, came
-
-
-def _with_places(document: MapDocument, union: Union) -> MapDocument:
-    document = bound_to(document, union.places.map_id)
-    for place in union.changed:
-        document = with_waypoint(document, place)
-    return document
+    findings = tuple(filter(None, (mounted.finding, *union.findings)))
+    return replace(union, findings=findings), came
 
 
 def _read(path: Path) -> MapDocument:

@@ -51,12 +51,12 @@ def find_kinds(label: str) -> tuple[ThingKind, ...]:
     whole = content_stems(label)
     head = content_stems(" ".join(words)) or whole
     tails = [stems[start:] for stems in (whole, head) for start in range(len(head))]
-    return next((found for tail in tails if (found := _kinds_by_stems().get(tail))), ())
+    return next((found for tail in tails if (found := _kinds_of(tail))), ())
 
 
 def find_kinds_called(name: str) -> tuple[ThingKind, ...]:
     """Find the kinds of which that is a name, with nothing added to it."""
-    return _kinds_by_stems().get(content_stems(name), ())
+    return _kinds_of(content_stems(name))
 
 
 def find_names(kind: ThingKind, label: str) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ def find_named_kinds(text: str) -> frozenset[ThingKind]:
         for n in range(1, _longest() + 1)
         for start in range(len(stems) - n + 1)
     )
-    return frozenset(kind for span in spans for kind in _kinds_by_stems().get(span, ()))
+    return frozenset(kind for span in spans for kind in _kinds_of(span))
 
 
 @cache
@@ -121,6 +121,19 @@ def _tells_little(ending: tuple[str, ...]) -> bool:
 @cache
 def _longest() -> int:
     return max(map(len, _kinds_by_stems()))
+
+
+def _kinds_of(stems: tuple[str, ...]) -> tuple[ThingKind, ...]:
+    """Return the kinds of a name, written in one word or in several: "night stand"."""
+    return _kinds_by_stems().get(stems, ()) or _kinds_by_letters().get("".join(stems), ())
+
+
+@cache
+def _kinds_by_letters() -> MappingProxyType[str, tuple[ThingKind, ...]]:
+    kinds: dict[str, dict[ThingKind, None]] = defaultdict(dict)
+    for stems, found in _kinds_by_stems().items():
+        kinds["".join(stems)].update(dict.fromkeys(found))
+    return MappingProxyType({letters: tuple(found) for letters, found in kinds.items()})
 
 
 @cache

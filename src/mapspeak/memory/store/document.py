@@ -5,17 +5,26 @@ A YAML parser needs a second for a thousand waypoints. So the text is cut at the
 way is read as a whole, slowly.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import islice
 
 from pydantic import ValidationError
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
+from mapspeak.memory.frames import Frames
 from mapspeak.memory.quoting import name_key, quote_name
 from mapspeak.memory.store.eventschema import read_events
-from mapspeak.memory.store.layout import Layout, find_records, read_plain_record, whole
+from mapspeak.memory.store.frameschema import read_frames
+from mapspeak.memory.store.layout import (
+    Layout,
+    find_records,
+    find_records_again,
+    read_plain_record,
+    whole,
+)
 from mapspeak.memory.store.schema import (
     fault_in,
     find_misspelt_keys,
@@ -41,7 +50,7 @@ _MAX_WARNINGS = 5
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What a record says and where it stands in the text.
+    """What a record says.
 
     Attributes:
         misspelt: Keys that look like known ones, each with the known one.
@@ -50,8 +59,6 @@ class Record:
     waypoint: Waypoint
     key: str
     misspelt: tuple[tuple[str, str], ...]
-    start: int
-    end: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +79,9 @@ class MapDocument:
         line_end: What most of its lines end in, and all that are written.
         root: Its top mapping without the records; None where the file says nothing.
         records: By `name_key`, in the order of the file.
+        spans: Where each record stands in the text, in the same order.
         events: By their ids, likewise.
+        frames: All but the file's own.
     """
 
     source: str
@@ -82,14 +91,20 @@ class MapDocument:
     root: MappingNode | None
     layout: Layout
     records: Mapping[str, Record]
+    spans: tuple[tuple[int, int], ...]
     events: Mapping[str, EventRecord]
     map_id: str | None
+    frames: Frames
     warnings: tuple[str, ...]
 
     @property
     def content(self) -> bytes:
         """The file's bytes."""
         return self.encoded(self.text)
+
+    def span_of(self, key: str) -> tuple[int, int]:
+        """Return where the record of a `name_key` stands in the text."""
+        return self.spans[list(self.records).index(key)]
 
     def find_entry(self, key: str) -> str | None:
         """Return what the file says under a key of its own, beside the records."""
@@ -104,7 +119,12 @@ class MapDocument:
     def to_map(self) -> SemanticMap:
         """Return the remembered places."""
         waypoints = tuple(record.waypoint for record in self.records.values())
-        return SemanticMap(map_id=self.map_id, waypoints=waypoints, warnings=self.warnings)
+        return SemanticMap(
+            map_id=self.map_id,
+            waypoints=waypoints,
+            frames=self.frames,
+            warnings=self.warnings,
+        )
 
 
 def parse_document(
@@ -119,30 +139,50 @@ def parse_document(
         SemanticMapError: It has a fault; the message names the line and the column.
     """
     decoded = _decoded(content, source)
-    text = decoded.removeprefix(_BOM).replace("\r\n", "\n")
+    return parse_text(
+        decoded.removeprefix(_BOM).replace("\r\n", "\n"),
+        source=source,
+        line_end="\r\n" if 2 * decoded.count("\r\n") > decoded.count("\n") else "\n",
+        has_bom=decoded.startswith(_BOM),
+        previous=previous,
+    )
+
+
+def parse_text(
+    text: str, *, source: str, line_end: str, has_bom: bool, previous: MapDocument | None
+) -> MapDocument:
+    """Read the text of a semantic map file, whose lines end in a line feed.
+
+    Raises:
+        SemanticMapError: As for `parse_document`.
+    """
     try:
-        layout, root = _cut(text, previous)
+        scan = _scan(text, previous)
+        layout, root = scan.layout, scan.root
         with _moved(layout.offset_in_text):
             map_id = _map_id(root)
             events = {each.id: (each, node) for each, node in read_events(root)}
-        records = list(_records(text, layout, root, map_id, previous))
-        by_key = _by_key(records)
+            frames = Frames(tuple(frame for frame, _ in read_frames(root)))
+        records, spans = _records(text, scan, map_id)
+        by_key = _by_key(records, spans)
     except TextError as fault:
         raise _at_its_place(fault, source, text) from fault
     return MapDocument(
         source=source,
         text=text,
-        line_end="\r\n" if 2 * decoded.count("\r\n") > decoded.count("\n") else "\n",
-        has_bom=decoded.startswith(_BOM),
+        line_end=line_end,
+        has_bom=has_bom,
         root=root,
         layout=layout,
         records=by_key,
+        spans=spans,
         events={
             key: EventRecord(event, *map(layout.offset_in_text, (node.start, node.end)))
             for key, (event, node) in events.items()
         },
         map_id=map_id,
-        warnings=tuple(_warnings(text, root, records)),
+        frames=frames,
+        warnings=tuple(_warnings(text, root, records, spans)),
     )
 
 
@@ -178,18 +218,63 @@ def _at_its_place(fault: TextError, source: str, text: str) -> SemanticMapError:
 # --- what stands beside the records ----------------------------------------------------------
 
 
-def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode | None]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Scan:
+    """What can be told of a text before its records are read.
+
+    Attributes:
+        before: Records at its beginning that were read before.
+        behind: Likewise at its end.
+        known: Others that were read before, by their text.
+    """
+
+    layout: Layout
+    root: MappingNode | None
+    before: tuple[Record, ...] = ()
+    behind: tuple[Record, ...] = ()
+    known: Mapping[str, Record] = field(default_factory=dict)
+
+
+def _scan(text: str, previous: MapDocument | None) -> _Scan:
+    again = None if previous is None else _scan_again(text, previous)
+    if again is not None:
+        return again
     layout = find_records(text)
-    root = None
-    if previous is not None and previous.layout.spans and layout.spans:
-        # Only records may have changed: what was read before holds.
-        is_same = previous.layout.skeleton(previous.text) == layout.skeleton(text)
-        root = previous.root if is_same else None
-    root = root or _root(text, layout)
+    root = _root(text, layout)
     if layout.spans and _list_items(root):
         # A part of the list stands where its dashes do not show it.
-        return whole(text), _root(text, whole(text))
-    return layout, root
+        layout = whole(text)
+        return _Scan(layout=layout, root=_root(text, layout))
+    known = _by_text(previous, 0, len(previous.spans)) if previous else {}
+    return _Scan(layout=layout, root=root, known=known)
+
+
+def _scan_again(text: str, previous: MapDocument) -> _Scan | None:
+    again = find_records_again(text, old_text=previous.text, old=previous.layout)
+    if again is None:
+        return None
+    layout, root = again.layout, previous.root
+    if layout.skeleton(text) != previous.layout.skeleton(previous.text):
+        root = _root(text, layout)
+        with _moved(layout.offset_in_text):
+            is_like_before = not _list_items(root) and _map_id(root) == previous.map_id
+        if not is_like_before:
+            return None
+    records = tuple(previous.records.values())
+    i_behind = len(records) - again.n_behind
+    return _Scan(
+        layout=layout,
+        root=root,
+        before=records[: again.n_before],
+        behind=records[i_behind:],
+        known=_by_text(previous, again.n_before, i_behind),
+    )
+
+
+def _by_text(document: MapDocument, first: int, stop: int) -> dict[str, Record]:
+    records = islice(document.records.values(), first, stop)
+    spans = document.spans[first:stop]
+    return {document.text[a:b]: each for (a, b), each in zip(spans, records, strict=True)}
 
 
 def _root(text: str, layout: Layout) -> MappingNode | None:
@@ -222,31 +307,27 @@ def _map_id(root: MappingNode | None) -> str | None:
 
 
 def _records(
-    text: str,
-    layout: Layout,
-    root: MappingNode | None,
-    map_id: str | None,
-    previous: MapDocument | None,
-) -> Iterator[Record]:
-    known = {}
-    if previous is not None and previous.map_id == map_id:
-        known = {previous.text[each.start : each.end]: each for each in previous.records.values()}
-    for start, end in layout.spans:
+    text: str, scan: _Scan, map_id: str | None
+) -> tuple[tuple[Record, ...], tuple[tuple[int, int], ...]]:
+    spans, records = scan.layout.spans, list(scan.before)
+    for start, end in spans[len(scan.before) : len(spans) - len(scan.behind)]:
         block = text[start:end]
-        record = known.get(block)
-        if record is None:
+        record = scan.known.get(block)
+        if record is None or record.waypoint.map_id != map_id:
             with _moved(start.__add__):
                 record = _read_block(block, map_id)
-        yield replace(record, start=start, end=end)
-    for node in _list_items(root):
-        yield _read_node(node, map_id)
+        records.append(record)
+    # Where they stand otherwise, the dashes showed none.
+    nodes = _list_items(scan.root)
+    others = (_read_node(node, map_id) for node in nodes)
+    return (*records, *scan.behind, *others), (*spans, *((n.start, n.end) for n in nodes))
 
 
 def _read_block(block: str, map_id: str | None) -> Record:
     data = read_plain_record(block)
     if data is not None:
         try:
-            return _record(data, map_id, 0, len(block))
+            return _record(data, map_id)
         except ValidationError:
             pass  # Read again below, to say where the fault is.
     tree = parse_tree(block)
@@ -262,39 +343,56 @@ def _read_block(block: str, map_id: str | None) -> Record:
 
 def _read_node(node: Node, map_id: str | None) -> Record:
     try:
-        return _record(node.data, map_id, node.start, node.end)
+        return _record(node.data, map_id)
     except ValidationError as error:
         raise fault_in(node, error) from error
     except SemanticMapError as error:
         raise TextError(error.message, hint=error.hint, offset=node.start) from error
 
 
-def _record(data: Data, map_id: str | None, start: int, end: int) -> Record:
+def _record(data: Data, map_id: str | None) -> Record:
     waypoint = waypoint_from(data, map_id=map_id)
     misspelt = tuple(find_misspelt_keys(data))
-    return Record(waypoint, name_key(waypoint.name), misspelt, start, end)
+    return Record(waypoint, name_key(waypoint.name), misspelt)
 
 
-def _by_key(records: Iterable[Record]) -> dict[str, Record]:
-    by_key: dict[str, Record] = {}
-    for record in records:
-        twin = by_key.setdefault(record.key, record)
-        if twin is not record:
-            raise TextError(
-                f"Two waypoints are called {quote_name(record.waypoint.name)}.",
-                hint="Rename or remove one of them; case and spaces make no difference.",
-                offset=record.start,
-                other_offset=twin.start,
-            )
+def _by_key(records: Sequence[Record], spans: Sequence[tuple[int, int]]) -> dict[str, Record]:
+    by_key = {record.key: record for record in records}
+    if len(by_key) < len(records):
+        raise _twins(records, spans)
     return by_key
 
 
-def _warnings(text: str, root: MappingNode | None, records: Sequence[Record]) -> Iterator[str]:
+def _twins(records: Sequence[Record], spans: Sequence[tuple[int, int]]) -> TextError:
+    starts: dict[str, int] = {}
+    for record, (start, _) in zip(records, spans, strict=True):
+        other = starts.setdefault(record.key, start)
+        if other != start:
+            return TextError(
+                f"Two waypoints are called {quote_name(record.waypoint.name)}.",
+                hint="Rename or remove one of them; case and spaces make no difference.",
+                offset=start,
+                other_offset=other,
+            )
+    raise AssertionError  # There are two of one name.
+
+
+def _warnings(
+    text: str,
+    root: MappingNode | None,
+    records: Sequence[Record],
+    spans: Sequence[tuple[int, int]],
+) -> Iterator[str]:
     for key, known in find_misspelt_keys_of_file(root.data if root else {}):
         yield f"The key {quote_name(key)} of the file is not used; '{known}' would be."
-    misspelt = [(record, *keys) for record in records for keys in record.misspelt]
-    for record, key, known in misspelt[:_MAX_WARNINGS]:
-        line, _ = line_and_column(text, record.start)
+    misspelt = [
+        (record, span[0], *keys)
+        for record, span in zip(records, spans, strict=True)
+        if record.misspelt
+        for keys in record.misspelt
+    ]
+    for record, start, key, known in misspelt[:_MAX_WARNINGS]:
+        line, _ = line_and_column(text, start)
         what = f"{quote_name(key)} of {quote_name(record.waypoint.name)}"
         yield f"The key {what} (line {line}) is not used; '{known}' would be."
     if len(misspelt) > _MAX_WARNINGS:

@@ -15,7 +15,7 @@ from pydantic import (
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory.events import ID_RULE, Effect, Event, Outline, is_event_id
+from mapspeak.memory.events import ID_RULE, Effect, Event, Every, Outline, is_event_id
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.store.schema import Time, length_text, time_text
 from mapspeak.memory.store.tree import Data, ListNode, MappingNode, Node, TextError
@@ -74,8 +74,10 @@ class _EventEntry(BaseModel):
     outline: Annotated[tuple[Outline, ...], BeforeValidator(_outlines_of)] = ()
     begins: Annotated[Time, Field(alias="from")] = None
     until: Time = None
+    every: Every = Every.ONCE
     source: str | None = None
     recorded_at: Time = None
+    frame: str | None = None
 
     def to_event(self, number: int) -> Event:
         return Event(
@@ -87,8 +89,10 @@ class _EventEntry(BaseModel):
             outlines=self.outline,
             begins=self.begins,
             until=self.until,
+            every=self.every,
             source=self.source or "",
             recorded_at=self.recorded_at,
+            frame=self.frame,
         )
 
 
@@ -123,6 +127,15 @@ def read_events(root: MappingNode | None) -> tuple[EventNode, ...]:
     return tuple(events.values())
 
 
+def event_from(data: Data) -> Event:
+    """Return the event that a record with an id describes.
+
+    Raises:
+        ValidationError: The record does not say what it must.
+    """
+    return _EventEntry.model_validate(data).to_event(0)
+
+
 def event_data(event: Event) -> dict[str, Data]:
     """Return what a record says of an event: millimetres and seconds."""
     entries: dict[str, Data] = {
@@ -136,8 +149,10 @@ def event_data(event: Event) -> dict[str, Data]:
         "outline": "; ".join(map(_outline_text, event.outlines)),
         "from": time_text(event.begins),
         "until": time_text(event.until),
+        "every": "" if event.every is Every.ONCE else event.every.value,
         "source": event.source,
         "recorded_at": time_text(event.recorded_at),
+        "frame": event.frame,
     }
     return {key: value for key, value in entries.items() if value}
 

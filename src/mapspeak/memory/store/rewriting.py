@@ -1,15 +1,18 @@
 """A changed file: a record, an event or all places written; every other character as it was."""
 
 from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose
 from mapspeak.memory.events import Event
+from mapspeak.memory.frames import Frames
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store.document import MapDocument, parse_document
+from mapspeak.memory.store.document import MapDocument, parse_text
 from mapspeak.memory.store.editing import edited_record, entry_text, record_text
 from mapspeak.memory.store.eventschema import event_data
+from mapspeak.memory.store.frameschema import frame_data, read_frames
+from mapspeak.memory.store.memorystore import free_event_id
 from mapspeak.memory.store.schema import FILE_VERSION, record_data
 from mapspeak.memory.store.tree import (
     Data,
@@ -21,7 +24,7 @@ from mapspeak.memory.waypoint import Waypoint
 
 _GREETING = "# mapspeak semantic map. Edit freely: comments and order are kept.\n"
 _INDENT = 2
-_OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture")
+_OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture", "frame", "gone")
 
 
 def bound_to(document: MapDocument, map_id: str | None) -> MapDocument:
@@ -36,13 +39,12 @@ def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
     text = document.text
     entry = entry_text(key, value, indent=0)
     present = document.root.find_value(key) if document.root else None
-    keys = document.root.entries if document.root else ()
-    listed = next((name for name, _ in keys if name.text == "waypoints"), None)
+    is_listed = document.root is not None and document.root.find_value("waypoints") is not None
     if present is not None:
         start, end = map(document.layout.offset_in_text, (present.start, present.end))
         text = text[:start].rstrip(" ") + entry.removeprefix(f"{key}:") + text[end:]
-    elif listed is not None:
-        start = document.layout.offset_in_text(listed.start)
+    elif is_listed:
+        start = _start_of_records(document)
         text = text[:start] + entry + "\n" + text[start:]
     elif document.root is not None:
         text = _ended(text) + entry + "\n"
@@ -63,13 +65,38 @@ def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
     if record is None:
         text = _with_record(document, said)
     else:
-        _require_cut(document, record.start)
-        change = (record.start, record.end, record_data(record.waypoint), said)
+        start, end = document.span_of(key)
+        _require_cut(document, start)
+        change = (start, end, record_data(record.waypoint), said)
         text = _edited(document, [change], "waypoints")
-    written = _reparsed(document, text, keys={*document.records, key})
+    written = _reparsed(document, text, keys=document.records.keys() | {key})
     if record_data(written.records[key].waypoint) != said:
-        raise _layout_error(document, record.start if record else len(document.text))
+        raise _layout_error(document, document.span_of(key)[0] if record else len(document.text))
     return written
+
+
+def with_waypoints(document: MapDocument, waypoints: Iterable[Waypoint]) -> MapDocument:
+    """Return the file with several waypoints written, bound to the map that they are of."""
+    for waypoint in waypoints:
+        document = with_waypoint(bound_to(document, waypoint.map_id), waypoint)
+    return document
+
+
+def without_waypoint(document: MapDocument, key: str) -> MapDocument:
+    """Return the file without the record of a `name_key`; without any change where none has it.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    if key not in document.records:
+        return document
+    start, end = document.span_of(key)
+    _require_cut(document, start)
+    text = document.text
+    # Of a blank line on either side, one is enough.
+    if text[:start].endswith("\n\n") and text[end : end + 1] in ("", "\n"):
+        start -= 1
+    return _reparsed(document, text[:start] + text[end:], keys=document.records.keys() - {key})
 
 
 def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
@@ -81,10 +108,10 @@ def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]
     Raises:
         SemanticMapError: The file is laid out in a way that cannot be written to.
     """
-    named = event if event.id else replace(event, id=_free_id(document))
+    named = event if event.id else replace(event, id=free_event_id(document.events))
     record = document.events.get(named.id)
     if record is None:
-        text = _with_new_event(document, event_data(named))
+        text = _with_new_item(document, "events", event_data(named))
     else:
         change = (record.start, record.end, event_data(record.event), event_data(named))
         text = _edited(document, [change], "events")
@@ -95,30 +122,28 @@ def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]
     return changed, written.event
 
 
-def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
-    """Return the file with every waypoint and event moved from its frame to a new one.
-
-    Args:
-        entries: Keys of the file itself that change with it, such as `map`.
+def with_frames(document: MapDocument, frames: Frames) -> MapDocument:
+    """Return the file with frames that read otherwise, or that it did not have, written.
 
     Raises:
         SemanticMapError: The file is laid out in a way that cannot be written to.
     """
-    if document.records:
-        _require_cut(document, 0)
+    changes, known = list[_Change](), document.frames.by_id
+    for frame, node in read_frames(document.root):
+        start, end = map(document.layout.offset_in_text, (node.start, node.end))
+        written = frames.by_id.get(frame.id, frame)
+        if written != frame:
+            changes.append((start, end, frame_data(frame), frame_data(written)))
     after = document
-    for key, value in entries.items():
-        after = with_entry(after, key, value)
-    of_events = [
-        (each.start, each.end, event_data(each.event), event_data(each.event.moved(motion)))
-        for each in after.events.values()
-    ]
-    after = _reparsed(after, _edited(after, of_events, "events"))
-    of_waypoints = [
-        (each.start, each.end, record_data(each.waypoint), record_data(each.waypoint.moved(motion)))
-        for each in after.records.values()
-    ]
-    return _reparsed(after, _edited(after, of_waypoints, "waypoints"))
+    if changes:
+        after = _reparsed(after, _edited(after, changes, "frames"), list_key="frames")
+    for frame in frames.items:
+        if frame.id not in known:
+            text = _with_new_item(after, "frames", frame_data(frame))
+            after = _reparsed(after, text, list_key="frames")
+    if [frame_data(each) for each in after.frames.items] != list(map(frame_data, frames.items)):
+        raise _layout_error(document, 0, "frames")
+    return after
 
 
 _Change = tuple[int, int, dict[str, Data], dict[str, Data]]
@@ -151,15 +176,16 @@ def _with_record(document: MapDocument, said: dict[str, Data]) -> str:
     return _ended(text[:last_end]) + gap + record + text[last_end:]
 
 
-def _with_new_event(document: MapDocument, said: dict[str, Data]) -> str:
-    listed = document.root.find_value("events") if document.root else None
+def _with_new_item(document: MapDocument, list_key: str, said: dict[str, Data]) -> str:
+    """Return the text with an item more at the end of a list beside the records."""
+    listed = document.root.find_value(list_key) if document.root else None
     if not isinstance(listed, ListNode) or not listed.items:
-        return _with_first_item(document, "events", record_text(said, indent=_INDENT))
+        return _with_first_item(document, list_key, record_text(said, indent=_INDENT))
     last, text = listed.items[-1], document.text
     start, end = map(document.layout.offset_in_text, (last.start, last.end))
     dash = text[text.rfind("\n", 0, start) + 1 : start].find("-")
     if listed.is_flow or not isinstance(last, MappingNode) or dash < 0:
-        raise _layout_error(document, start, "events")
+        raise _layout_error(document, start, list_key)
     line_end = _line_end(text, end)
     return f"{text[:line_end]}\n{record_text(said, indent=dash)}{text[line_end + 1 :]}"
 
@@ -169,6 +195,9 @@ def _with_first_item(document: MapDocument, list_key: str, item: str) -> str:
     text, listed = document.text, document.root and document.root.find_value(list_key)
     if document.root is None and list_key == "waypoints":
         text = _ended(text or _GREETING) + f"version: {FILE_VERSION}\n"
+    if listed is None and list_key == "frames":
+        start = _start_of_records(document)
+        return f"{_ended(text[:start])}{list_key}:\n{item}{text[start:]}"
     if listed is None:
         return _ended(text) + f"{list_key}:\n{item}"
     start, end = map(document.layout.offset_in_text, (listed.start, listed.end))
@@ -183,9 +212,11 @@ def _with_first_item(document: MapDocument, list_key: str, item: str) -> str:
     return f"{head}\n{item}{text[line_end + 1 :]}"
 
 
-def _free_id(document: MapDocument) -> str:
-    numbers = [int(each[1:]) for each in document.events if each[:1] == "E" and each[1:].isdigit()]
-    return f"E{max(numbers, default=0) + 1}"
+def _start_of_records(document: MapDocument) -> int:
+    """Return where the key `waypoints` stands in the text; its end without one."""
+    keys = document.root.entries if document.root else ()
+    listed = next((name for name, _ in keys if name.text == "waypoints"), None)
+    return len(document.text) if listed is None else document.layout.offset_in_text(listed.start)
 
 
 def _require_cut(document: MapDocument, start: int) -> None:
@@ -194,23 +225,41 @@ def _require_cut(document: MapDocument, start: int) -> None:
 
 
 def _reparsed(
-    document: MapDocument, text: str, *, keys: set[str] | None = None, list_key: str = "waypoints"
+    document: MapDocument,
+    text: str,
+    *,
+    keys: AbstractSet[str] | None = None,
+    list_key: str = "waypoints",
 ) -> MapDocument:
     """Read the changed text before anybody relies on it."""
     try:
-        changed = parse_document(document.encoded(text), source=document.source, previous=document)
+        changed = parse_text(
+            text,
+            source=document.source,
+            line_end=document.line_end,
+            has_bom=document.has_bom,
+            previous=document,
+        )
     except SemanticMapError as error:
         raise _layout_error(document, 0, list_key) from error
-    if set(changed.records) != (set(document.records) if keys is None else keys):
+    if changed.records.keys() != (document.records.keys() if keys is None else keys):
         raise _layout_error(document, 0, list_key)
     return changed
+
+
+_ITEMS = {
+    "waypoints": ("waypoint", "name"),
+    "events": ("event", "text"),
+    "frames": ("frame", "id"),
+}
+"""What the items of each list are called, and their first key."""
 
 
 def _layout_error(
     document: MapDocument, offset: int, list_key: str = "waypoints"
 ) -> SemanticMapError:
     line, _ = line_and_column(document.text, offset)
-    item, first_key = {"waypoints": ("waypoint", "name"), "events": ("event", "text")}[list_key]
+    item, first_key = _ITEMS[list_key]
     return SemanticMapError(
         f"{document.source}, line {line}: mapspeak reads this layout, but cannot write to it.",
         hint=f"Put `{list_key}:` at the start of a line and each {item} below it as "

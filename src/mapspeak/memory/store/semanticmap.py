@@ -6,34 +6,37 @@ but what it read last.
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
+from mapspeak.memory.frames import Frames
 from mapspeak.memory.merging import Merge, merge_waypoint
-from mapspeak.memory.quoting import clean_line, name_key, quote_name
+from mapspeak.memory.quoting import clean_line, name_key
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile, Fingerprint
-from mapspeak.memory.store.rewriting import bound_to, with_event, with_waypoint
+from mapspeak.memory.store.memorystore import (
+    WriteReceipt,
+    event_in_its_frame,
+    in_its_frame,
+    require_same_map,
+)
+from mapspeak.memory.store.rewriting import (
+    bound_to,
+    with_event,
+    with_frames,
+    with_waypoint,
+    with_waypoints,
+    without_waypoint,
+)
+from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 LOCK_TIMEOUT_S = 5.0
 
 _N_TRIES = 5
 """How often a write starts anew because an editor saved the file in the same moment."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WriteReceipt:
-    """What a write did; it is on the disk.
-
-    Attributes:
-        waypoint: As it is remembered from now on: millimetres, hundredths of a degree.
-    """
-
-    waypoint: Waypoint
-    previous: Waypoint | None
-    n_waypoints: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +60,7 @@ class SemanticMapStore:
         self, path: Path, *, map_id: str | None = None, lock_timeout_s: float = LOCK_TIMEOUT_S
     ) -> None:
         self.path = path
+        self.walls = WallFolder(path)
         self.map_id = clean_line(map_id or "") or None
         self._file = DurableFile(path, lock_timeout_s=lock_timeout_s)
         self._seen: _Seen | None = None
@@ -65,9 +69,6 @@ class SemanticMapStore:
         """Return all remembered places; look into the file only where it changed.
 
         A file that was broken by hand since gives the places read before, with a warning.
-
-        Raises:
-            SemanticMapError: The file cannot be read, or has a fault and was never without one.
         """
         seen = self._look()
         if seen.document is None:
@@ -76,78 +77,77 @@ class SemanticMapStore:
         return replace(places, warnings=(*places.warnings, *self._warnings(seen)))
 
     def read_events(self) -> tuple[Event, ...]:
-        """Return all events of the file, also those that are over; as `read` otherwise.
-
-        Of a file that belongs to another map there are none: they are at other places here.
-        """
-        document = self._document()
-        if not self._is_same_map(document.map_id):
-            return ()
-        return tuple(record.event for record in document.events.values())
+        """Return all events of the file, also those that are over."""
+        return tuple(record.event for record in self._document().events.values())
 
     def read_entry(self, key: str) -> str | None:
-        """Return what the file says under a key of its own, such as `snapshot`; as `read`."""
+        """Return what the file says under a key of its own."""
         return self._document().find_entry(key)
 
     def write_event(self, event: Event) -> Event:
-        """Write an event, in its own record where its id is there already; return it with its id.
+        """Write an event, in its own record where its id is there already."""
 
-        Raises:
-            SemanticMapError: As for `write`.
-        """
-        _, after = self._change(
-            lambda document: with_event(bound_to(document, self.map_id), event)[0]
-        )
+        def write(document: MapDocument) -> MapDocument:
+            bound = document if event.frame else bound_to(document, self.map_id)
+            return with_event(bound, _event_in_its_frame(document, event))[0]
+
+        _, after = self.rewrite(write)
         ids = [event.id] if event.id else list(after.events)[-1:]
         return after.events[ids[0]].event
 
     def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Create a waypoint, or put it in place of the one of that name; done when it returns.
+        """Create a waypoint, or change the record of that name."""
+        return self._write(waypoint, lambda _, placed: placed)
 
-        Raises:
-            SemanticMapError: The file belongs to another map, has a fault, cannot be written, or is
-                held by another program. Nothing was changed.
-        """
-        return self._write(waypoint, lambda _: waypoint)
+    def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
+        """Write many waypoints, all or none; into the file of whichever map they are of."""
+        self.rewrite(lambda document: with_waypoints(document, change(document.to_map())))
 
     def remember(
         self, waypoint: Waypoint, *, gone: Iterable[str] = ()
     ) -> tuple[WriteReceipt, Merge]:
-        """Join a waypoint with what is remembered under its name; done when it returns.
-
-        What another program remembers of it in the same moment is joined, too.
-
-        Args:
-            gone: Labels of landmarks that are not there any more.
-
-        Raises:
-            SemanticMapError: As for `write`.
-        """
+        """Join a waypoint with what is remembered under its name."""
         labels = tuple(gone)
         merges: list[Merge] = []
 
-        def join(before: Waypoint | None) -> Waypoint:
-            merges.append(merge_waypoint(before, waypoint, gone=labels))
+        def join(before: Waypoint | None, placed: Waypoint) -> Waypoint:
+            merges.append(merge_waypoint(before, placed, gone=labels))
             return merges[-1].waypoint
 
         receipt = self._write(waypoint, join)
         return receipt, merges[-1]
 
+    def remove(self, name: str) -> Waypoint | None:
+        """Take a record out of the file, with the comments in it."""
+        key = name_key(name)
+        if key not in self._document().records:
+            return None
+        before, _ = self.rewrite(lambda document: without_waypoint(document, key))
+        return _known(before, key)
+
+    def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
+        """Write what is known of frames; no record changes."""
+        _, after = self.rewrite(lambda document: with_frames(document, change(document.frames)))
+        return after.frames
+
     def _write(
-        self, waypoint: Waypoint, change: Callable[[Waypoint | None], Waypoint]
+        self, waypoint: Waypoint, change: Callable[[Waypoint | None, Waypoint], Waypoint]
     ) -> WriteReceipt:
         map_id = self.map_id or waypoint.map_id
-        self._require_same_map(waypoint.map_id, f"The waypoint {quote_name(waypoint.name)}")
-        key = name_key(waypoint.name)
-        before, after = self._change(
-            lambda document: with_waypoint(
-                bound_to(document, map_id), change(_known(document, key))
-            )
-        )
+        require_same_map(waypoint, self.map_id)
+        keys: list[str] = []
+
+        def write(document: MapDocument) -> MapDocument:
+            find = partial(_known, document)
+            placed = in_its_frame(waypoint, find_known=find, frames=document.frames)
+            keys.append(name_key(placed.name))
+            bound = document if waypoint.frame else bound_to(document, map_id)
+            return with_waypoint(bound, change(_known(document, keys[-1]), placed))
+
+        before, after = self.rewrite(write)
         return WriteReceipt(
-            waypoint=after.records[key].waypoint,
-            previous=_known(before, key),
-            n_waypoints=len(after.records),
+            waypoint=after.records[keys[-1]].waypoint,
+            previous=_known(before, keys[-1]),
         )
 
     def _document(self) -> MapDocument:
@@ -155,16 +155,6 @@ class SemanticMapStore:
         if seen.document is None:
             raise _raised_again(seen.fault)
         return seen.document
-
-    def _change(
-        self, change: Callable[[MapDocument], MapDocument]
-    ) -> tuple[MapDocument, MapDocument]:
-
-        def change_of_this_map(document: MapDocument) -> MapDocument:
-            self._require_same_map(document.map_id, f"The file {self.path}")
-            return change(document)
-
-        return self.rewrite(change_of_this_map)
 
     def rewrite(
         self, change: Callable[[MapDocument], MapDocument]
@@ -178,6 +168,7 @@ class SemanticMapStore:
             SemanticMapError: The file has a fault, cannot be written, or is held by another
                 program. Nothing was changed.
         """
+        self._look()  # Others do not wait while this reads what it never read before.
         with self._file.locked():
             for _ in range(_N_TRIES):
                 seen = self._look()
@@ -213,29 +204,11 @@ class SemanticMapStore:
     def _warnings(self, seen: _Seen) -> Iterator[str]:
         if seen.fault is not None:
             yield f"{seen.fault} Until then, the waypoints read before are given."
-        map_id = seen.document.map_id if seen.document else None
-        if not self._is_same_map(map_id):
-            yield (
-                f"{self.path} belongs to the map {_say_map(map_id)}, but the robot is on "
-                f"{_say_map(self.map_id)}: its poses may be wrong here, and nothing is written "
-                "to it."
-            )
-
-    def _is_same_map(self, map_id: str | None) -> bool:
-        return None in (map_id, self.map_id) or map_id == self.map_id
-
-    def _require_same_map(self, map_id: str | None, what: str) -> None:
-        if not self._is_same_map(map_id):
-            raise SemanticMapError(
-                f"{what} belongs to the map {_say_map(map_id)}, but the robot is on "
-                f"{_say_map(self.map_id)}.",
-                hint="Use another file for this map; if it is the same place under another name, "
-                f"let the file say `map: {self.map_id}`.",
-            )
 
 
-def _say_map(map_id: str | None) -> str:
-    return quote_name(map_id or "")
+def _event_in_its_frame(document: MapDocument, event: Event) -> Event:
+    record = document.events.get(event.id)
+    return event_in_its_frame(event, None if record is None else record.event, document.frames)
 
 
 def _known(document: MapDocument, key: str) -> Waypoint | None:

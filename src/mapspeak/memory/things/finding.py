@@ -12,16 +12,18 @@ from mapspeak.memory.quoting import name_key
 from mapspeak.memory.things.joining import (
     Group,
     Posteriors,
-    group_names,
     join_sightings,
 )
+from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_waypoints
 from mapspeak.memory.things.placing import Placement, measure_agreement, place, trust_range
 from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
-from mapspeak.memory.things.thing import Category, Thing, View, name_the_same
+from mapspeak.memory.things.thing import Category, Thing, View
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 
+SURFACE_M = 0.15
+"""A surface is drawn by the map and met by a ray within so much of each other."""
 PLAIN_SIGHT_M = 5.0
 """Who stands no farther and has nothing between would see a thing."""
 ELSEWHERE_RAD = math.radians(30)
@@ -58,6 +60,19 @@ class Things:
         far_m = waypoint.pose.point.distance_to(point)
         free_m = self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)]
         return bool(far_m <= PLAIN_SIGHT_M and far_m <= free_m + BODY_M)
+
+    def measure_share_in_sight(self, waypoint: Waypoint, thing: Thing) -> float:
+        """Return how much of where a thing's surface may be is in plain sight from a waypoint."""
+        if thing.whereabouts is None or not len(thing.whereabouts):
+            return 0.0
+        grid, pose = self.sight.grid, waypoint.pose
+        ways = thing.whereabouts - (pose.x, pose.y)
+        far_m = np.hypot(*ways.T)
+        angles = np.arctan2(ways[:, 1], ways[:, 0]) - grid.origin.yaw_rad
+        rays = np.rint(angles * N_RAYS / math.tau).astype(np.intp) % N_RAYS
+        free_m = self.surroundings[waypoint].near_m[rays]
+        in_sight = (far_m <= PLAIN_SIGHT_M) & (far_m <= free_m + SURFACE_M)
+        return float(in_sight.mean())
 
     def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
         """Return the things with a place that were seen from a waypoint."""

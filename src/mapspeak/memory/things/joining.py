@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mapspeak.memory.merging import SAME_SPOT_M
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.likelihood import WeighedView, are_apart
 from mapspeak.memory.things.placing import (
     Posterior,
@@ -20,7 +21,6 @@ from mapspeak.memory.things.placing import (
     log_evidence,
 )
 from mapspeak.memory.things.sight import SightMap, find_log_priors
-from mapspeak.memory.things.thing import name_the_same
 from mapspeak.memory.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
@@ -79,16 +79,6 @@ class _Ballot:
         self.votes[at] -= self._weights[mine]
         self._n_left[at] -= 1
         self.votes[at[self._n_left[at] == 0]] = -np.inf
-
-
-def group_names(labels: Sequence[str]) -> list[frozenset[str]]:
-    """Return labels that may, over others, name the same; each label is in one group."""
-    groups: list[set[str]] = []
-    for label in sorted(set(labels)):
-        mine = [group for group in groups if any(name_the_same(label, other) for other in group)]
-        groups = [group for group in groups if group not in mine]
-        groups.append({label}.union(*mine))
-    return [frozenset(group) for group in groups]
 
 
 def join_sightings(posteriors: "Posteriors", sightings: Sequence[WeighedView]) -> list[Group]:

@@ -1,44 +1,12 @@
 """A thing as it is remembered, and the views that speak for it and against it."""
 
 import math
-import re
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import lru_cache
 
 from mapspeak.geometry import Point
-from mapspeak.memory.policy import words_of
-from mapspeak.memory.search.wordindex import without_accents
 from mapspeak.memory.waypoint import Confidence, Landmark
 from mapspeak.spatial.grid import FloatArray
-
-
-def name_the_same(label: str, other: str) -> bool:
-    """Return True when one label says no more than the other leaves open, and both end in one noun.
-
-    "extinguisher", "red extinguisher" and "fire extinguishers" name the same; "coffee machine" and
-    "washing machine" do not, though "machine" may be either.
-    """
-    words, others = _words_of(label), _words_of(other)
-    return words[-1] == others[-1] and (set(words) <= set(others) or set(others) <= set(words))
-
-
-@lru_cache(maxsize=4096)
-def _words_of(label: str) -> tuple[str, ...]:
-    plain = without_accents(label)
-    # A place or a detail after the noun, as in "sink with a mirror", does not change the noun.
-    head = re.split(r"\b(?:with|on|in|at|near|under|behind|beside|for|of)\b|[,(;]", plain)[0]
-    words = [_singular(word) for word in re.findall(r"[^\W\d_]+", head) or [plain.strip()]]
-    return tuple(word for word in words if word not in words_of("looks")) or tuple(words)
-
-
-def _singular(word: str) -> str:
-    if len(word) > 4 and word.endswith(("ses", "xes", "zes", "ches", "shes")):
-        return word[:-2]
-    if len(word) > 4 and word.endswith("ies"):
-        return word[:-3] + "y"
-    return word[:-1] if len(word) > 3 and word.endswith("s") and word[-2] not in "su" else word
-
 
 _DOUBTS = {Confidence.CERTAIN: 0.5, Confidence.LIKELY: 1.0, Confidence.UNSURE: 2.0, None: 1.0}
 """How many times as often as usual an observer errs, by its own word."""

@@ -10,11 +10,11 @@ from heapq import heapify, heappop, heappush
 from itertools import islice
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory import Landmark
+from mapspeak.memory import Landmark, Waypoint
 from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import GoalCheck, judge_goal
-from mapspeak.places.naming import Place, split_room
+from mapspeak.places.naming import Place, find_elsewhere, split_room
 from mapspeak.places.relations.choosing import stand_at
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
@@ -103,6 +103,7 @@ class Recall:
         candidates: The likeliest first; of equally likely ones the nearest by path. Where nothing
             is remembered they are the nearest in meaning, and probably none is meant.
         n_searched: How many places and things pass the filters.
+        elsewhere: Places of other maps that the request names.
         doubt: Why the first candidate may still be wrong; None where nothing speaks for that.
     """
 
@@ -111,6 +112,7 @@ class Recall:
     candidates: tuple[RecallCandidate, ...]
     n_searched: int
     is_empty: bool
+    elsewhere: tuple[Waypoint, ...]
     doubt: RecallDoubt | None
 
     @property
@@ -147,6 +149,7 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
         answer=answer,
         candidates=candidates,
         n_searched=len(among),
+        elsewhere=find_elsewhere(world.memory, query.words),
         is_empty=not (world.recollection.places or world.things),
         doubt=find_doubt(candidates[0], room_id=query.room_id) if is_found else None,
     )

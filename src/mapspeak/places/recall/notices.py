@@ -8,10 +8,11 @@ import numpy as np
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory import LEFT_OUT, Concern, SemanticMapStore
+from mapspeak.memory import LEFT_OUT, Concern, MemoryStore
 from mapspeak.memory.events import (
     Effect,
     Event,
+    Every,
     current_events,
     find_place_ids,
     gives_orders,
@@ -40,7 +41,7 @@ SLOW_FACTOR, SLOW_EXTRA_M = 2.0, 5.0
 
 def note_event(
     world: WorldModel,
-    store: SemanticMapStore,
+    store: MemoryStore,
     *,
     text: str,
     effect: Effect,
@@ -48,6 +49,7 @@ def note_event(
     place: str | None = None,
     begins: datetime | None = None,
     until: datetime | None = None,
+    every: Every = Every.ONCE,
     source: str = "",
 ) -> Event:
     """Remember an event, with the outline that its place has now; return it as it was written.
@@ -75,6 +77,7 @@ def note_event(
         outlines=() if found is None or effect is Effect.NONE else _outline(world.rooms, found),
         begins=begins,
         until=until,
+        every=every,
         source=source,
         recorded_at=now,
     )
@@ -130,7 +133,7 @@ def find_cut_off(world: WorldModel, event: Event, now: datetime) -> list[str]:
     ]
 
 
-def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event:
+def end_event(store: MemoryStore, event_id: str, *, now: datetime) -> Event:
     """End an event at once; its record stays, as something that was.
 
     Raises:
@@ -143,19 +146,18 @@ def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event
         raise SemanticMapError(
             f"There is no event '{event_id}'.", hint=f"Events that last now: {known}."
         )
-    if event.until is not None and event.until <= now:
+    if event.until is not None and event.is_over(now):
         raise SemanticMapError(
             f"{event.id} had already ended, at {event.until.isoformat(timespec='minutes')}.",
             hint="Nothing was changed.",
         )
     begins = None if event.begins is not None and event.begins >= now else event.begins
-    return store.write_event(replace(event, begins=begins, until=now))
+    return store.write_event(replace(event, begins=begins, until=now, every=Every.ONCE))
 
 
 def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:
     """Return the events that last, and those still to come, one sentence each."""
-    lasting = [each for each in events if each.until is None or now < each.until]
-    return tuple(event.sentence(now) for event in lasting)
+    return tuple(event.sentence(now) for event in events if not event.is_over(now))
 
 
 def say_unplaced(events: Iterable[Event], revision: MapRevision, now: datetime) -> tuple[str, ...]:
@@ -199,8 +201,9 @@ def _area_of(event: Event, revision: MapRevision, now: datetime) -> ClosedArea |
     if not outlines:
         return None
     until = ""
-    if event.until is not None:
-        local = event.until.astimezone(now.tzinfo)
+    _, end = event.find_time(now)
+    if end is not None:
+        local = end.astimezone(now.tzinfo)
         until = f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
     return ClosedArea(
         name=_title_of(event),

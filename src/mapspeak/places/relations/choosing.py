@@ -16,7 +16,7 @@ from mapspeak.places.naming import (
     place_of,
     say_spot,
 )
-from mapspeak.places.relations.relating import find_related
+from mapspeak.places.relations.relating import find_related, find_several_related
 from mapspeak.places.standing import (
     arrival_pose,
     choose_crossing,
@@ -46,6 +46,27 @@ def find_place(world: WorldModel, words: str) -> Place:
     if isinstance(place.thing, RememberedThing) and not place.reason:
         return place_of(world, place.thing, name=place.name)
     return place
+
+
+def find_places(world: WorldModel, words: str) -> tuple[Place, ...]:
+    """Find all that words mean: one place, or the several of "all rooms".
+
+    Raises:
+        GoalError: There is no such place, or one thing is meant and there are several.
+    """
+    return find_group(world, words) or (find_place(world, words),)
+
+
+def find_group(world: WorldModel, words: str) -> tuple[Place, ...]:
+    """Find the places of "all rooms" and the like; () for words that mean no group.
+
+    Raises:
+        GoalError: There are too few of them.
+    """
+    return tuple(
+        place_of(world, place.thing) if isinstance(place.thing, RememberedThing) else place
+        for place in find_several_related(world, words)
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
-from mapspeak.places.relations.grammar import Compass, Side, Towards, read_heading
+from mapspeak.places.relations.grammar import Towards
 from mapspeak.places.relations.placement import find_reachable_cells, refuse, stand, tolerance_m
 from mapspeak.places.relations.referents import (
     ROBOT,
@@ -20,6 +20,7 @@ from mapspeak.places.relations.referents import (
     point_before,
     refer_to_door,
 )
+from mapspeak.places.relations.vocabulary import Compass, Side, read_heading
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 

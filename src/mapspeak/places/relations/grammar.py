@@ -1,110 +1,27 @@
 """From words to a relation: a small grammar, one pattern for each kind of phrase."""
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 
-from mapspeak.places.naming import NUMBER
-
-
-class Side(StrEnum):
-    """A side of a thing, its own where it has a front, else as somebody sees it."""
-
-    LEFT = "left of"
-    RIGHT = "right of"
-    FRONT = "in front of"
-    BEHIND = "behind"
-
-
-class Compass(StrEnum):
-    """A direction on the map: +y is north."""
-
-    EAST = "east"
-    NORTH_EAST = "north-east"
-    NORTH = "north"
-    NORTH_WEST = "north-west"
-    WEST = "west"
-    SOUTH_WEST = "south-west"
-    SOUTH = "south"
-    SOUTH_EAST = "south-east"
-
-    @property
-    def heading_rad(self) -> float:
-        """The same as a yaw in the map frame."""
-        return math.remainder(list(Compass).index(self) * math.tau / 8, math.tau)
-
-
-UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-UNIT = r"(?P<unit>m|met(?:er|re)s?|cm|centimet(?:er|re)s?|mm|millimet(?:er|re)s?)"
-COUNTS = ("half", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-DISTANCE = rf"(?P<number>{NUMBER}|half a|an?|{'|'.join(COUNTS[1:])})[\s_-]*{UNIT}"
-GAP = r"(?:[\s_]|-(?![\d.]))+"
-"""Spaces, underscores and hyphens, but not the sign of a number."""
-
-
-def pattern(words: str) -> re.Pattern[str]:
-    """Return a pattern in which every space stands for spaces, underscores or hyphens."""
-    return re.compile(words.replace(" ", GAP), re.IGNORECASE | re.DOTALL)
-
-
-ARTICLE = pattern(r"(?:the|a|an) (?=\S)")
-
-
-def plain(words: str) -> str:
-    """Return the words without what does not count: an article, brackets or quotes around them."""
-    kept = words.strip().rstrip(".!?;").strip()
-    while kept:
-        inner = _without_brackets(ARTICLE.sub("", kept, count=1) if ARTICLE.match(kept) else kept)
-        if inner == kept:
-            return kept
-        kept = inner
-    return kept
-
-
-def _without_brackets(words: str) -> str:
-    is_around = (words[:1], words[-1:]) in {("(", ")"), ("'", "'"), ('"', '"')} and len(words) > 1
-    inner = words[1:-1]
-    return inner.strip() if is_around and "(" not in inner and ")" not in inner else words
-
-
-def read_distance(match: re.Match[str]) -> float | None:
-    """Return the metres that a match of `DISTANCE` says; None where it says none."""
-    number, unit = match["number"], match["unit"]
-    if number is None:
-        return None
-    lowered = re.sub(GAP, " ", number).casefold()
-    said = {"a": 1.0, "an": 1.0, "half a": 0.5} | {word: n for n, word in enumerate(COUNTS) if n}
-    value = said[lowered] if lowered in said else float(number)
-    short = {"c": "cm", "mi": "mm", "mm": "mm"}
-    lowered_unit = unit.casefold()
-    key = short.get(lowered_unit[:2], short.get(lowered_unit[:1], "m"))
-    return value * UNITS_M[key]
-
-
-def read_compass(words: str | None) -> Compass | None:
-    """Return direction that is spelt "north-east", "northeast", "north east" or "north_east"."""
-    if words is None:
-        return None
-    letters = re.sub(GAP, "", words).casefold().removesuffix("ern")
-    return next((each for each in Compass if each.replace("-", "") == letters), None)
-
-
-def read_heading(heading_rad: float) -> Compass:
-    """Return the nearest of eight directions of the map."""
-    return list(Compass)[round(heading_rad / (math.tau / 8)) % 8]
-
-
-class Kind(StrEnum):
-    """What one can ask for the nearest of."""
-
-    FRONTIER = "frontier"
-    DOOR = "door"
-    CORRIDOR = "corridor"
-    ROOM = "room"
-    OPEN_SPACE = "open space"
-    REMEMBERED = "remembered place"
+from mapspeak.places.relations.vocabulary import (
+    COUNT,
+    DISTANCE,
+    GAP,
+    ORDER,
+    RANK,
+    RANKS,
+    Compass,
+    Kind,
+    Order,
+    Side,
+    pattern,
+    plain,
+    read_compass,
+    read_count,
+    read_distance,
+    read_order,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,10 +63,10 @@ class Facing:
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """A place, and what to look at there."""
+    """A place, and what to look at there; None for the door that leads back out of it."""
 
     place: str
-    to: str
+    to: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,17 +116,42 @@ class Middle:
     of: str
 
 
-@dataclass(frozen=True, slots=True)
-class Nearest:
-    """The nearest thing of a kind, from the robot or from a place."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Superlative:
+    """The nearest thing of a kind, the second-smallest, and so on.
+
+    Attributes:
+        rank: 1 for the first in that order.
+        to: From where ways are measured; None for the robot.
+    """
 
     kind: Kind
+    order: Order = Order.NEAREST
+    rank: int = 1
     to: str | None = None
 
 
-Relation = (
-    Towards | Away | NextTo | Facing | Turned | Between | Corner | WallSide | Middle | Nearest
-)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Several:
+    """All things of a kind or a name, or the first of an order.
+
+    Attributes:
+        kind: None for remembered things.
+        label: What these are called; else empty.
+        count: How many; None for all.
+        at: The room they are of, or from where ways are measured; None for all and the robot.
+    """
+
+    kind: Kind | None = None
+    label: str = ""
+    order: Order = Order.NEAREST
+    count: int | None = None
+    at: str | None = None
+
+
+Standing = Towards | Away | NextTo | Facing | Turned | Between | Corner | WallSide | Middle
+"""What means where to stand."""
+Relation = Standing | Superlative | Several
 
 LONGEST = 300
 """Longer words are a text and no phrase."""
@@ -298,13 +240,41 @@ def _read_wall(match: re.Match[str]) -> Relation:
     return WallSide(of=match["of"], compass=read_compass(match["compass"]), is_along=is_along)
 
 
-def _read_nearest(kind: Kind) -> Read:
-    return lambda match: Nearest(kind, match["to"])
+def _read_superlative(kind: Kind) -> Read:
+    def read(match: re.Match[str]) -> Relation:
+        rank = 1 + RANKS.index(match["rank"].casefold()) if match["rank"] else 1
+        order = read_order(match["order"])
+        return Superlative(kind=kind, order=order, rank=rank, to=match["to"])
+
+    return read
 
 
+def _read_some(kind: Kind) -> Read:
+    def read(match: re.Match[str]) -> Relation:
+        order, count = read_order(match["order"]), read_count(match["count"])
+        return Several(kind=kind, order=order, count=count, at=match["at"])
+
+    return read
+
+
+def _read_all(kind: Kind) -> Read:
+    return lambda match: Several(kind=kind, at=match["at"])
+
+
+ALL = r"(?:all|every|each)(?: of)?(?: the)?"
+TOWARDS = r"(?:at|through|to|towards)"
+LOOKING = rf"(?:facing|looking (?:back )?{TOWARDS})"
+ITS_DOOR = r"(?:its (?:own )?|the )(?:door|doorway)"
 FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
     (
-        pattern(r"(?P<place>.+),? (?:facing|looking at) (?P<to>.+)"),
+        pattern(
+            rf"(?P<place>.+?),? (?:(?:facing|looking) back(?: {TOWARDS} {ITS_DOOR})?"
+            rf"|{LOOKING} its (?:own )?(?:door|doorway))"
+        ),
+        lambda m: Turned(m["place"].rstrip(","), None),
+    ),
+    (
+        pattern(rf"(?P<place>.+),? {LOOKING} (?P<to>.+)"),
         lambda m: Turned(m["place"].rstrip(","), m["to"]),
     ),
     *(
@@ -331,10 +301,25 @@ FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
     (pattern(rf"{AT}(?:middle|cent(?:er|re)) of{OPEN}(?P<of>.+)"), lambda m: Middle(m["of"])),
     *(
         (
-            pattern(rf"{AT}(?:nearest|closest) (?:{words})(?: (?:to|from) (?P<to>.+))?"),
-            _read_nearest(kind),
+            pattern(rf"{AT}{RANK}{ORDER} (?:{words})(?: (?:to|from) (?P<to>.+))?"),
+            _read_superlative(kind),
         )
         for kind, words in KINDS.items()
+    ),
+    *(
+        (
+            pattern(rf"{THE}{COUNT} {ORDER} (?:{words})s?(?: (?:to|from) (?P<at>.+))?"),
+            _read_some(kind),
+        )
+        for kind, words in KINDS.items()
+    ),
+    *(
+        (pattern(rf"{ALL} (?:{words})s?(?: (?:of|in) (?P<at>.+))?"), _read_all(kind))
+        for kind, words in KINDS.items()
+    ),
+    (
+        pattern(rf"{ALL} (?:(?:remembered|known) )?(?P<label>.+)"),
+        lambda m: Several(label=m["label"]),
     ),
     (
         pattern(rf"(?:next to|beside|near(?: to)?|close to|by){OPEN}(?P<of>.+)"),

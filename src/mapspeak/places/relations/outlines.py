@@ -10,8 +10,8 @@ import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.naming import Place, say_spot
-from mapspeak.places.relations.grammar import Compass, read_heading
 from mapspeak.places.relations.placement import find_reachable_cells, join_or, refuse, stand
+from mapspeak.places.relations.vocabulary import Compass, read_heading
 from mapspeak.places.standing import cells_of, facing_in
 from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import Mask

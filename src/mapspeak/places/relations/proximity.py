@@ -1,4 +1,4 @@
-"""Places next to a thing, half way between two, and the nearest of a kind."""
+"""Places next to a thing, so far from it, in sight of it, and half way between two."""
 
 import math
 
@@ -8,7 +8,6 @@ from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.directions import front_of_region
-from mapspeak.places.relations.grammar import Kind
 from mapspeak.places.relations.placement import (
     ReachableCells,
     find_reachable_cells,
@@ -18,12 +17,9 @@ from mapspeak.places.relations.placement import (
     tolerance_m,
 )
 from mapspeak.places.relations.referents import ROBOT, Referent, find_normal, point_before
-from mapspeak.places.standing import cells_of, point_along
-from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.paths import DistanceField
-from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.places.standing import point_along
+from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
 
 NEAR_M = (0.15, 0.7)
 """What is next to a thing leaves so much room between it and the robot's own circle."""
@@ -233,65 +229,3 @@ def _step_off(world: WorldModel, point: Point) -> Point | None:
     if not away_m.size or float(away_m.min()) > STEP_OFF_M:
         return None
     return Point(*floor.points[int(np.argmin(away_m))].tolist())
-
-
-CLASSES = {
-    Kind.CORRIDOR: RoomClass.CORRIDOR,
-    Kind.ROOM: RoomClass.ROOM,
-    Kind.OPEN_SPACE: RoomClass.OPEN_SPACE,
-}
-
-
-def find_nearest(world: WorldModel, kind: Kind, start: Referent | None) -> Place:
-    """Find the thing of a kind that is nearest to the robot or to a place, by path.
-
-    Raises:
-        GoalError: None can be reached.
-    """
-    distances = world.distances if start is None else world.map.distances_from(start.anchor)
-    own = None if start is None else (start.region or start.door)
-    found = [each for each in _sort(world, kind, distances) if each[1].thing is not own]
-    if not found:
-        raise refuse(_say_none(world, kind))
-    away_m, place = found[0]
-    who = ROBOT if start is None else start.name
-    is_in = place.name == world.find_room_id(distances.start)
-    where = f"{who} is in it" if is_in else f"{away_m:.1f} m by path from {who}"
-    return Place(place.name, place.thing, f"the nearest {kind}, {where}")
-
-
-def find_all_near(world: WorldModel, kind: Kind) -> tuple[Place, ...]:
-    """Find all things of a kind that the robot can get to, nearest first."""
-    return tuple(place for _, place in _sort(world, kind, world.distances))
-
-
-def _sort(world: WorldModel, kind: Kind, distances: DistanceField) -> list[tuple[float, Place]]:
-    """Return the things of a kind that can be reached, nearest first, each with its metres."""
-    away: list[tuple[Frontier | Door | RememberedPlace | Region, float | None]]
-    match kind:
-        case Kind.FRONTIER:
-            frontiers = world.frontiers.frontiers
-            away = [(each, distances.distance_to(each.pose.point)) for each in frontiers]
-        case Kind.DOOR:
-            crossings = ((each, world.find_crossing(each)) for each in world.rooms.doors)
-            away = [(door, distances.distance_to(point)) for door, point in crossings if point]
-        case Kind.REMEMBERED:
-            points = ((each, each.waypoint.pose.point) for each in world.places)
-            away = [(place, distances.distance_to(point)) for place, point in points]
-        case _:
-            regions = (each for each in world.rooms.regions if each.room_class is CLASSES[kind])
-            away = [(each, _least_m(world, each, distances)) for each in regions]
-    reached = [(m, Place(each.id, each)) for each, m in away if m is not None and m < math.inf]
-    return sorted(reached, key=lambda each: each[0])
-
-
-def _least_m(world: WorldModel, region: Region, distances: DistanceField) -> float:
-    """Return the metres by path to the nearest floor of a region."""
-    reached_m = distances.distances_at(*cells_of(world.rooms, region))
-    return float(reached_m.min(initial=np.inf))
-
-
-def _say_none(world: WorldModel, kind: Kind) -> str:
-    if kind is Kind.FRONTIER:
-        return f"There is no frontier to go to: {str(world.frontiers.verdict).replace('_', ' ')}."
-    return f"There is no {kind} that the robot can get to."

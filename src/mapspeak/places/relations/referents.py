@@ -20,9 +20,9 @@ from mapspeak.places.naming import (
     find_place_ids,
     say_spot,
 )
-from mapspeak.places.relations.grammar import GAP, pattern, plain
 from mapspeak.places.relations.outlines import find_sides
 from mapspeak.places.relations.placement import refuse
+from mapspeak.places.relations.vocabulary import GAP, pattern, plain
 from mapspeak.places.standing import point_ahead
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray

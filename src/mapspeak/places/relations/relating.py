@@ -15,14 +15,15 @@ from mapspeak.places.relations.grammar import (
     Corner,
     Facing,
     Middle,
-    Nearest,
     NextTo,
     Relation,
+    Several,
+    Standing,
+    Superlative,
     Towards,
     Turned,
     WallSide,
     parse_relation,
-    plain,
 )
 from mapspeak.places.relations.outlines import (
     RoomCorner,
@@ -34,9 +35,13 @@ from mapspeak.places.relations.outlines import (
     stand_in_corner,
     stand_in_middle,
 )
-from mapspeak.places.relations.placement import find_reachable_cells, refuse, stand
+from mapspeak.places.relations.placement import (
+    find_reachable_cells,
+    is_in_sight,
+    refuse,
+    stand,
+)
 from mapspeak.places.relations.proximity import (
-    find_nearest,
     stand_away,
     stand_between,
     stand_facing,
@@ -48,10 +53,17 @@ from mapspeak.places.relations.referents import (
     find_known,
     find_room_here,
     refer_to,
+    refer_to_door,
     refer_to_point,
 )
+from mapspeak.places.relations.superlatives import (
+    find_several,
+    find_superlative,
+    require_one,
+)
+from mapspeak.places.relations.vocabulary import plain
 from mapspeak.places.ways import standing_point
-from mapspeak.spatial.rooms import Region
+from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_RELATIONS = 4
@@ -72,8 +84,24 @@ def find_related(world: WorldModel, words: str) -> Place | None:
     relation = parse_relation(words)
     if relation is None:
         return find_named(world, plain(words)) or find_by_kind(world, words)
-    place = Reader(world).find(relation, MOST_RELATIONS - 1)
+    reader = Reader(world)
+    if isinstance(relation, Several):
+        found = reader.find_several(relation)
+        return require_one(words, found) if found else None
+    place = reader.find(relation, MOST_RELATIONS - 1)
     return place if place.name else replace(place, name=" ".join(words.split())[:LONGEST_NAME])
+
+
+def find_several_related(world: WorldModel, words: str) -> tuple[Place, ...]:
+    """Return the places of "all rooms", "the two nearest doors"; () for words that mean no group.
+
+    Raises:
+        GoalError: There are too few of them.
+    """
+    relation = parse_relation(words)
+    if not isinstance(relation, Several) or find_named(world, plain(words)):
+        return ()
+    return Reader(world).find_several(relation)
 
 
 STANDS = {NextTo: stand_next_to, Facing: stand_facing}
@@ -90,10 +118,22 @@ class Reader:
 
         `n_left` more relations may stand inside it.
         """
+        match relation:
+            case Superlative(to=to):
+                start = None if to is None else self._refer(to, n_left)
+                return find_superlative(self._world, relation, start)
+            case Several():
+                found = self.find_several(relation)
+                if not found:
+                    raise no_such_place(self._world, relation.label)
+                return require_one(relation.label or f"all {relation.kind}s", found)
+            case _:
+                return self._stand(relation, n_left)
+
+    def _stand(self, relation: Standing, n_left: int) -> Place:
+        """Return where the robot stands for a relation."""
         world = self._world
         match relation:
-            case Nearest(kind, to):
-                return find_nearest(world, kind, None if to is None else self._refer(to, n_left))
             case Towards():
                 place = self._stand_towards(relation, n_left)
             case Away(of=of, away_m=away_m):
@@ -114,6 +154,11 @@ class Reader:
                 place = self._stand_in_middle(self._refer(of, n_left))
         return place
 
+    def find_several(self, relation: Several) -> tuple[Place, ...]:
+        """Return the places of a group; () where nothing is called so."""
+        at = None if relation.at is None else self._refer(relation.at, MOST_RELATIONS - 2)
+        return find_several(self._world, relation, at)
+
     def _refer(self, words: str, n_left: int) -> Referent:
         """Return what words inside a phrase mean: a name, or another phrase."""
         known = find_known(self._world, words)
@@ -132,7 +177,7 @@ class Reader:
     def _refer_to_relation(self, relation: Relation, words: str, n_left: int) -> Referent:
         """Return what a phrase is about: the corner itself, say, not where one stands in it."""
         match relation:
-            case Nearest():
+            case Superlative():
                 return refer_to(self._world, self.find(relation, n_left))
             case Corner():
                 corner = self._find_corners(relation, n_left)[0]
@@ -149,9 +194,9 @@ class Reader:
 
     def _refer_to_both(self, relation: Between, n_left: int) -> tuple[Referent, Referent]:
         """Return the two things of a "between", by the first division of the words that works."""
-        doors = self._find_both_doors(relation.of)
-        if doors is not None:
-            return doors
+        both = self._find_both(relation.of) or self._find_both_doors(relation.of)
+        if both is not None:
+            return both
         fault: GoalError | None = None
         for one, other in relation.ways:
             try:
@@ -161,6 +206,19 @@ class Reader:
         raise fault or refuse(
             "Between what and what?", else_hint="Say it such as 'between D1 and D2'."
         )
+
+    def _find_both(self, words: str) -> tuple[Referent, Referent] | None:
+        """Return the two things of "between the two nearest doors"."""
+        found = find_several_related(self._world, words)
+        if not found:
+            return None
+        if len(found) != 2:
+            raise refuse(
+                f"{words[:LONGEST_NAME]!r} means {len(found)} places.",
+                [f"between {found[0].name} and {found[-1].name}"],
+            )
+        one, other = (refer_to(self._world, place) for place in found)
+        return one, other
 
     def _find_both_doors(self, words: str) -> tuple[Referent, Referent] | None:
         """Return the two doors of "between the doors" and "between the doors of R2"."""
@@ -193,7 +251,28 @@ class Reader:
             )
         return stand_in_middle(self._world, thing.region)
 
+    def _stand_looking_back(self, words: str, n_left: int) -> Place:
+        """Return where to stand in a room and see the door that the robot comes in by."""
+        world, room = self._world, self._region_of(words, n_left)
+        ways_m = {
+            door: world.path_m(point)
+            for door in world.rooms.doors_of(room)
+            if (point := world.find_crossing(door)) is not None
+        }
+        reached: dict[Door, float] = {door: m for door, m in ways_m.items() if m is not None}
+        if not reached:
+            raise refuse(f"The robot gets through no door of {room.id}.", [f"facing {room.id}"])
+        door = min(reached, key=lambda each: reached[each])
+        at, why = standing_point(world, Place(room.id, room)), f"in {room.id}, facing {door.id}"
+        sees = is_in_sight(world, np.array([[at.x, at.y]]), door.place)
+        if not sees[0]:
+            at = stand_facing(world, refer_to_door(world, door, room)).point
+        counted = "its door" if len(reached) == 1 else f"the nearest of its {len(reached)} doors"
+        return stand(at, f"{why}, {counted}", at.bearing_to(door.place))
+
     def _stand_turned(self, relation: Turned, n_left: int) -> Place:
+        if relation.to is None:
+            return self._stand_looking_back(relation.place, n_left)
         thing = self._refer(relation.to, n_left)
         inner = parse_relation(relation.place)
         if inner is not None and find_known(self._world, relation.place) is None:

@@ -1,5 +1,6 @@
 """What a model reads of what is remembered, and of what only the detector has reported."""
 
+from collections.abc import Callable
 from datetime import datetime
 from typing import Self
 
@@ -8,8 +9,12 @@ from pydantic import Field
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import find_concern
-from mapspeak.memory.episodes.observation import EpisodeQuery, Observation, ObservationKind
-from mapspeak.memory.episodes.store import EpisodeStore
+from mapspeak.memory.episodes.observation import (
+    EpisodePage,
+    EpisodeQuery,
+    Observation,
+    ObservationKind,
+)
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
@@ -28,17 +33,20 @@ APART_M = 1.0
 
 
 def say_reported(
-    store: EpisodeStore, answer: Recall, query: RecallQuery, *, map_id: str | None, now: datetime
+    find: Callable[[EpisodeQuery], EpisodePage],
+    answer: Recall,
+    query: RecallQuery,
+    *,
+    now: datetime,
 ) -> str:
     """Return what the detector reported of a thing that no record is called by; empty for nothing.
 
     A report is less than a record: nobody has checked it, and where the thing is was not noted.
 
     Args:
-        store: What was observed.
+        find: Finds observations, placed on the robot's map.
         answer: What is remembered.
         query: What was asked.
-        map_id: The map that the robot is on; None takes all poses for its.
         now: The operator's time.
     """
     is_open = answer.verdict in (Verdict.NOT_REMEMBERED, Verdict.AMBIGUOUS)
@@ -47,7 +55,7 @@ def say_reported(
         return ""
     seen = [
         (label, each)
-        for each in _find_pictures(store, query, map_id)
+        for each in _find_pictures(find, query)
         if (label := _find_label(each, query.words)) is not None
     ]
     if not seen:
@@ -64,7 +72,7 @@ def say_reported(
 
 
 def _find_pictures(
-    store: EpisodeStore, query: RecallQuery, map_id: str | None
+    find: Callable[[EpisodeQuery], EpisodePage], query: RecallQuery
 ) -> tuple[Observation, ...]:
     wanted = EpisodeQuery(
         words=query.words,
@@ -74,11 +82,11 @@ def _find_pictures(
         since=query.since,
         until=query.until,
         kind=ObservationKind.PICTURE,
-        map_id=map_id,
         limit=MOST_READ,
     )
     try:
-        return tuple(match.observation for match in store.find(wanted).matches)
+        matches = find(wanted).matches
+        return tuple(match.observation for match in matches if not match.is_elsewhere)
     except SemanticMapError:
         # What cannot be read costs no answer about what is remembered.
         return ()

@@ -1,7 +1,7 @@
 """What the model reads: frozen reports, each field with one line of explanation."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Self
 
 from pydantic import Field
@@ -11,16 +11,20 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict, say_check
+from mapspeak.places.naming import find_elsewhere
 from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import say_pose, say_pose_doubt
+from mapspeak.server.text.recall import say_places_left
+from mapspeak.server.text.wording import say_elsewhere, say_pose, say_pose_doubt
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 
 MOST_NAMED = 12
+MOST_PLACES = 20
+"""So many are given in full at once; each has some 800 characters."""
 AT_GOAL_M = 0.5
 """Navigation ends a drive within its tolerance, usually 0.25 m; farther off is worth a word."""
 
@@ -223,14 +227,22 @@ class MemoryAnswer(Report):
     warnings: list[str]
 
     @classmethod
-    def of(cls, memory: SemanticMap, name: str | None) -> Self:
-        """Make the report of all places, or of the one of that name or id.
+    def of(cls, memory: SemanticMap, name: str | None, *, first: int = 0) -> Self:
+        """Make the report of a page of all places, or of the one of that name or id.
+
+        Args:
+            first: The number of the place to begin with.
 
         Raises:
             SemanticMapError: There is no such place.
         """
         places = number_places(memory.waypoints)
         shown = [place for place in places if name is None or _is_called(place, name)]
+        if name is not None and not shown and find_elsewhere(memory, name):
+            raise SemanticMapError(
+                f"{name[:80]!r} is remembered on another map; how that lies is not known here.",
+                hint=lead("{realign_memory} finds out how the maps lie."),
+            )
         if name is not None and not shown:
             known = ", ".join(
                 f"{place.id} {quote_name(place.waypoint.name)}" for place in places[:MOST_NAMED]
@@ -239,18 +251,30 @@ class MemoryAnswer(Report):
                 f"No place called {name[:80]!r} is remembered.",
                 hint=f"Remembered are {known or 'no places yet'}; without a name all are given.",
             )
-        return cls.of_places(memory, shown)
+        return cls.of_places(memory, shown, first=first)
 
     @classmethod
     def of_places(
-        cls, memory: SemanticMap, shown: Iterable[RememberedPlace], *, advice: Sequence[str] = ()
+        cls,
+        memory: SemanticMap,
+        chosen: Sequence[RememberedPlace],
+        *,
+        first: int = 0,
+        advice: Sequence[str] = (),
     ) -> Self:
-        """Make the report of some places, with what else is to be said of them."""
+        """Make the report of a page of some places, with what else is to be said of them."""
+        shown = chosen[first : first + MOST_PLACES]
+        behind = chosen[first + len(shown) :]
         return cls(
             map=memory.map_id,
             n_places=len(memory.waypoints),
             waypoints=[WaypointReport.of(place) for place in shown],
-            warnings=[*advice, *memory.warnings],
+            warnings=[
+                *say_places_left(behind, first=first + len(shown)),
+                *advice,
+                *say_elsewhere(memory),
+                *memory.warnings,
+            ],
         )
 
 
@@ -287,7 +311,7 @@ class WriteAnswer(Report):
             replaced="; ".join(say_replaced(receipt.previous, merge.waypoint)),
             landmarks=list(say_landmarks(merge)),
             refused=list(refused),
-            n_places=receipt.n_waypoints,
+            n_places=len(memory.waypoints),
             warnings=list(warnings),
         )
 

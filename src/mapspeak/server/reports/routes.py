@@ -55,7 +55,7 @@ class RouteAnswer(Report):
             done=[_say(stop) for stop in plan.stops if stop.state is StopState.DONE],
             skipped=[
                 f"{_say(stop)}: {say_obstacle(stop)}"
-                for stop in plan.stops
+                for stop in (*plan.stops, *plan.left_out)
                 if stop.state is StopState.SKIPPED
             ],
             next=_say_in_full(ahead[0]) if ahead else "",

@@ -5,16 +5,13 @@ from collections.abc import Awaitable
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.memory.alignment.comparing import MapComparison, MapRelation
 from mapspeak.memory.alignment.fitting import (
     LEAST_SHARED_M,
     Certainty,
     MapFit,
 )
-from mapspeak.memory.alignment.keeping import (
-    MapComparison,
-    MapRelation,
-    RealignReceipt,
-)
+from mapspeak.memory.alignment.keeping import RealignReceipt
 from mapspeak.memory.alignment.surfaces import (
     MapAgreement,
 )
@@ -84,10 +81,17 @@ def _say_of_place(finding: MemoryFinding) -> str:
         FindingKind.WRONG_ROOM: f"is filed under {told}, but stands in {here}",
         FindingKind.NOT_SEEN: (
             f"looked to where the {thing} should be, {finding.far_m or 0.0:.1f} m away, and does "
-            "not name it"
+            f"not name it{_say_since(finding.n_since)}"
         ),
     }
     return f"{quote_name(finding.waypoints[0])} {said[finding.kind]}"
+
+
+def _say_since(n_since: int) -> str:
+    """Say that a thing was not there at so many looks after it was seen last."""
+    if not n_since:
+        return ""
+    return ", after it was seen last" + (f": the last {n_since} looks" if n_since > 1 else "")
 
 
 def _say_of_landmark(finding: MemoryFinding) -> str:
@@ -134,10 +138,13 @@ async def say_moved(comparing: Awaitable[MapComparison | None]) -> str:
 
 
 AFTER_MOVE = {
-    MapRelation.MOVED: "Remembered poses are off by as much. {realign_memory} moves them.",
-    MapRelation.OTHER: "Remembered poses mean nothing here: another memory belongs to it.",
+    MapRelation.MOVED: "Places remembered on another map are left out. {realign_memory} aligns it.",
+    MapRelation.OTHER: "Places remembered on another map are left out: they mean nothing here.",
 }
-UNSURE = "Remembered poses may be off. Let the robot see more, then call {realign_memory}."
+UNSURE = (
+    "Places remembered on another map are left out. Let the robot see more, then call "
+    "{realign_memory}."
+)
 
 
 def say_receipt(receipt: RealignReceipt) -> str:
@@ -154,13 +161,12 @@ def say_receipt(receipt: RealignReceipt) -> str:
             "for this map.",
         )
     if motion is None or receipt.certainty is None:
-        return f"Nothing had to be moved. {said}"
+        return f"Nothing had to be aligned. {said}"
     turn_deg = math.degrees(motion.yaw_rad)
     return (
-        f"{receipt.n_waypoints} waypoints, {receipt.n_events} events and "
-        f"{receipt.n_observations} observations were moved: turned by {turn_deg:.1f} degrees "
-        f"about the old map's origin, which lies at ({motion.x:.2f}, {motion.y:.2f}) now. {said} "
-        f"The file as it was: {receipt.undo_path}. Certainty: {receipt.certainty}."
+        f"{receipt.n_waypoints} waypoints and {receipt.n_events} events more can be used here: "
+        f"their map lies turned by {turn_deg:.1f} degrees, its origin at ({motion.x:.2f}, "
+        f"{motion.y:.2f}). {said} Certainty: {receipt.certainty}."
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from mapspeak.errors import GoalError
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
-from mapspeak.places.relations.choosing import check_place, find_place
+from mapspeak.places.relations.choosing import check_place, find_place, find_places
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.tables import say_sizes
@@ -40,7 +40,7 @@ def _find_others(world: WorldModel, begin: Place, places: Sequence[str] | None) 
     """Return each place once, without the one to measure from."""
     ends = [Place(region.id, region) for region in world.rooms.regions]
     if places is not None:
-        ends = [find_place(world, words) for words in places]
+        ends = [place for words in places for place in find_places(world, words)]
     by_name = {end.name: end for end in ends if end.name != begin.name}
     if by_name:
         return list(by_name.values())

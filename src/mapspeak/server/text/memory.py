@@ -1,16 +1,21 @@
 """The state of the memory, its episodes and its events, as text; what was observed is quoted."""
 
 import math
-import re
-from collections.abc import Iterator, Sequence
-from datetime import datetime, timedelta
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from datetime import datetime
 
-from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import wrap_angle
-from mapspeak.memory import Confidence, Landmark, Merge, Reunion, Waypoint
+from mapspeak.memory import Confidence, Landmark, Merge, Reunion, SemanticMap, Waypoint
 from mapspeak.memory.consistency.findings import MemoryFinding
-from mapspeak.memory.episodes.observation import EpisodeFilter, EpisodeMatch, EpisodePage
+from mapspeak.memory.episodes.observation import (
+    EpisodeFilter,
+    EpisodeMatch,
+    EpisodePage,
+    Observation,
+)
 from mapspeak.memory.events import Event
+from mapspeak.memory.frames import FrameId, Frames
 from mapspeak.memory.quoting import quote, quote_name, tell_name
 from mapspeak.places.recall.nearby import Nearby
 from mapspeak.places.recall.notices import closes_robot_in, find_cut_off
@@ -19,64 +24,6 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
-
-AHEAD = "2026-11-20T09:30, 09:30, in 2h, now"
-PAST = "2026-11-20, 2026-11-20T09:30, 09:30, 2h ago"
-"""What schemas and hints say that can be written; `read_moment` reads all of it."""
-SPAN = re.compile(
-    r"(?P<ahead>in\s+)?(?P<n>\d{1,6}(?:\.\d+)?)\s*"
-    r"(?P<unit>s(?:ec(?:ond)?s?)?|m(?:in(?:ute)?s?)?|h(?:ours?)?|d(?:ays?)?)(?P<past>\s+ago)?",
-    re.IGNORECASE,
-)
-CLOCK = re.compile(r"(?P<hour>\d{1,2}):(?P<minute>\d\d)")
-UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days"}
-
-
-def read_moment(
-    text: str | None, now: datetime | None, *, is_ahead: bool = False
-) -> datetime | None:
-    """Return the moment that is meant, in the zone of `now` where none is said.
-
-    Args:
-        text: As `AHEAD` or `PAST` say, or "2h" without a direction; None for no moment.
-        now: The operator's time; None where it is not known.
-        is_ahead: True where a span without a direction is counted from now on, and a time of day
-            that is over is tomorrow's.
-
-    Raises:
-        SemanticMapError: It is no moment, or counted from a clock that is not known.
-    """
-    if text is None:
-        return None
-    if now is None:
-        raise SemanticMapError(
-            "The time by the calendar is not known here.", hint="Leave times out."
-        )
-    try:
-        moment = _read(text.strip(), now, is_ahead=is_ahead)
-    except (ValueError, OverflowError) as error:
-        raise SemanticMapError(
-            f"{text[:40]!r} is no time.",
-            hint=f"Write it as one of {AHEAD if is_ahead else PAST}.",
-        ) from error
-    return moment if moment.tzinfo else moment.replace(tzinfo=now.tzinfo)
-
-
-def _read(text: str, now: datetime, *, is_ahead: bool) -> datetime:
-    if text.casefold() == "now":
-        return now
-    if said := SPAN.fullmatch(text):
-        if said["ahead"] and said["past"]:
-            raise ValueError(text)
-        span = timedelta(**{UNITS[said["unit"][0].lower()]: float(said["n"])})
-        is_later = bool(said["ahead"]) or (is_ahead and not said["past"])
-        return now + span if is_later else now - span
-    if clock := CLOCK.fullmatch(text):
-        moment = now.replace(
-            hour=int(clock["hour"]), minute=int(clock["minute"]), second=0, microsecond=0
-        )
-        return moment + timedelta(days=1) if is_ahead and moment <= now else moment
-    return datetime.fromisoformat(text)
 
 
 def say_age(moment: datetime, now: datetime) -> str:
@@ -88,9 +35,40 @@ def say_age(moment: datetime, now: datetime) -> str:
     return f"{max(age_s, 0):.0f} s ago"
 
 
+def say_loaded(found: SemanticMap, placed: SemanticMap, *, robot: str, now: datetime | None) -> str:
+    """Say what was remembered before, how old it is, and how much of it is of this map.
+
+    Args:
+        found: As it was before.
+        placed: As it is now, on the robot's map.
+        robot: The name of this robot.
+    """
+    names = {each.name for each in found.waypoints} | {each.name for each in found.elsewhere}
+    if not names:
+        return ""
+    elsewhere = [each for each in placed.elsewhere if each.name in names]
+    times = [each.recorded_at for each in found.waypoints if each.recorded_at is not None]
+    age = f", the last {say_age(max(times), now)}" if times and now is not None else ""
+    by = _say_robots(placed.frames, {each.frame for each in found.waypoints}, robot)
+    fits = "on this map"
+    if len(elsewhere) == len(names):
+        fits = "not on this map: none is used here"
+    elif elsewhere:
+        fits = f"on this map but for {len(elsewhere)} of other maps, which are left out"
+    return f"Memory: {say_count(len(names), 'place')} remembered before{age}{by}, {fits}."
+
+
+def _say_robots(frames: Frames, used: Collection[FrameId], robot: str) -> str:
+    """Name the robots that made the maps of records, where that was noted."""
+    robots = {each.robot for each in frames.items if each.id in used and each.robot}
+    named = ("this robot" if each == robot else quote_name(each) for each in sorted(robots))
+    return f", by {' and '.join(named)}" if robots else ""
+
+
 MOST_LISTED = 30
 LONGEST_TEXT = 300
 MOST_THINGS = 8
+MOST_ROOMS = 12
 TO_MEND = (
     "To mend one: look again from there and call {write_semantic_data}, with gone for what is no "
     "longer there."
@@ -154,10 +132,17 @@ def _say_finding(finding: MemoryFinding) -> str:
     return f"{finding.kind.replace('_', ' ')}: {say_finding(finding)}"
 
 
-def describe_episodes(page: EpisodePage, *, now: datetime | None) -> str:
-    """Return a page of observations, a line for each, with why it is there."""
+def describe_episodes(
+    page: EpisodePage, *, now: datetime | None, summed: Sequence[EpisodeMatch] = ()
+) -> str:
+    """Return a page of observations, a line for each, with why it is there.
+
+    Args:
+        summed: What to sum up before, also of other pages; nothing without any.
+    """
     first = 0 if page.next_page is None else page.next_page.offset - len(page.matches)
     lines = [f"{say_count(page.n_matches, 'observation')}; showing {len(page.matches)}. {OBSERVED}"]
+    lines += _sum_up(summed, page.n_matches, now)
     if page.anchor is not None:
         lines.append(f"Near to where this was: {say_episode(page.anchor, now=now)}")
     lines += [say_episode(match, now=now) for match in page.matches]
@@ -168,13 +153,61 @@ def describe_episodes(page: EpisodePage, *, now: datetime | None) -> str:
     return "\n".join(lines)
 
 
-def _say_moment(time: datetime, now: datetime | None) -> str:
-    """Return when something was: with its date where that is not today, and how long ago."""
+def _sum_up(matches: Sequence[EpisodeMatch], n_all: int, now: datetime | None) -> Iterator[str]:
+    """Say how many of which kind were made in which room and when, and what was seen last."""
+    if not matches:
+        return
+    rooms: dict[str, list[Observation]] = {}
+    last: dict[str, EpisodeMatch] = {}
+    for match in sorted(matches, key=lambda each: each.observation.recorded_at, reverse=True):
+        rooms.setdefault(_say_room(match), []).append(match.observation)
+        for label in match.observation.labels:
+            last.setdefault(label, match)
+    counted = sorted(rooms.items(), key=lambda room: -len(room[1]))
+    shown = [f"{room}: {_say_counts(seen, now)}" for room, seen in counted[:MOST_ROOMS]]
+    left = f" (the first {len(matches)} of {n_all})" if len(matches) < n_all else ""
+    yield f"By room{left}: {'; '.join(shown)}{_say_left(len(counted) - len(shown), 'room')}."
+    if last:
+        newest = list(last.items())[:MOST_THINGS]
+        things = [f"{quote(label)} {_say_seen(match, now)}" for label, match in newest]
+        yield f"Seen last: {'; '.join(things)}{_say_left(len(last) - len(things), 'label')}."
+
+
+def _say_seen(match: EpisodeMatch, now: datetime | None) -> str:
+    return f"{_say_moment(match.observation.recorded_at, now)}, in {_say_room(match)}"
+
+
+def _say_counts(seen: Sequence[Observation], now: datetime | None) -> str:
+    """Return "11 pictures, 2 records, 16:02 to 16:22" of observations, the newest first."""
+    kinds = Counter(str(each.kind) for each in seen)
+    counts = ", ".join(say_count(number, kind) for kind, number in kinds.most_common())
+    first, last = (_say_clock(seen[i].recorded_at, now) for i in (-1, 0))
+    return f"{counts}, {first}" + ("" if first == last else f" to {last}")
+
+
+def _say_left(n_left: int, what: str) -> str:
+    return f"; and {say_count(n_left, what)} more" if n_left else ""
+
+
+def _say_room(match: EpisodeMatch) -> str:
+    if match.is_elsewhere:
+        return "another map"
+    room_id = match.observation.room_id
+    return tell_name(room_id) if room_id else "no room"
+
+
+def _say_clock(time: datetime, now: datetime | None) -> str:
+    """Return the time of day, with its date where that is not today."""
     if now is None:
         return f"{time:%Y-%m-%d %H:%M}"
     local = time.astimezone(now.tzinfo)
-    day = "" if local.date() == now.date() else f"{local:%Y-%m-%d} "
-    return f"{day}{local:%H:%M}, {say_age(time, now)}"
+    return f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
+
+
+def _say_moment(time: datetime, now: datetime | None) -> str:
+    """Return when something was: with its date where that is not today, and how long ago."""
+    clock = _say_clock(time, now)
+    return clock if now is None else f"{clock}, {say_age(time, now)}"
 
 
 def say_consequences(world: WorldModel, event: Event, now: datetime) -> str:
@@ -217,7 +250,10 @@ def say_episode(match: EpisodeMatch, *, now: datetime | None) -> str:
     seen = match.observation
     parts = [
         f"{seen.id}: {seen.kind} at {_say_moment(seen.recorded_at, now)}",
-        f"from {say_pose(seen.pose)}, in {tell_name(seen.room_id) if seen.room_id else 'no room'}",
+        "from another map"
+        if match.is_elsewhere
+        else f"from {say_pose(seen.pose)}, in "
+        f"{tell_name(seen.room_id) if seen.room_id else 'no room'}",
     ]
     if seen.text:
         parts.append(quote(seen.text, most=LONGEST_TEXT))

@@ -60,6 +60,7 @@ STEPS = {
     NextStep.DRIVE_ROUND: "{hint}. {navigate_to} leads round.",
     NextStep.USE_OTHER_TOOLS: "To drive use {navigate_to}. To stop use {stop_robot}. {hint}.",
     NextStep.BEGIN_ROUTE: "Call {follow_route} with its stops.",
+    NextStep.ALIGN: "{hint}. {realign_memory} finds out how the maps lie.",
 }
 """What is said in place of a hint in plain words, with or without it."""
 
@@ -77,7 +78,7 @@ def say_hint(error: MapspeakError) -> str:
 
 
 WHAT = (
-    "mapspeak gives you a mobile robot: its map with rooms and doors, its camera, drives to any "
+    "mapspeak gives you a mobile robot: its map, its camera, its rooms and doors, drives to any "
     "place, and a memory of places."
 )
 READS_ONLY = "Nothing here moves or changes the robot."
@@ -93,9 +94,10 @@ LINES = (
         "id, never a pixel."
     ),
     (
-        "{find_place} finds a remembered place or thing (T1) by name or by what it is for. "
+        "{find_place} finds a remembered place or thing (T1) by name or by what it is for: take it "
+        "first. "
         "{describe_place} tells one place in full. {measure} compares ways and sizes. {check_goal} "
-        "says whether the robot can go there."
+        "says whether the robot can go there. {what_is_blocked} says what is closed or in the way."
     ),
     (
         'A place is an id, a remembered name, "robot" or "x, y"; {navigate_to} also takes x, y, '
@@ -104,8 +106,9 @@ LINES = (
     ),
     "{stop_robot} works at any time. {cancel_goal} ends one drive at any time.",
     (
-        "{look_through_camera} shows what the robot sees. {write_semantic_data} remembers it with "
-        "the pose. {get_semantic_data} recalls places in full."
+        "{look_through_camera} shows what the robot sees. {look_around} shows a whole room. "
+        "{write_semantic_data} remembers it with the pose. {get_semantic_data} recalls places in "
+        "full."
     ),
     (
         "For the robot's ROS start with {ros_overview}. {ros_topics} with ends=true counts who "

@@ -3,14 +3,17 @@
 from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import Point
-from mapspeak.memory.quoting import name_key, quote
+from mapspeak.memory.quoting import name_key, quote, quote_name
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
+from mapspeak.memory.store.forgetting import Forgotten
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
 from mapspeak.server.text.offered import lead
+from mapspeak.worldmodel.recollection import RememberedPlace
 
 LONGEST_QUOTE = 120
+MOST_LEFT_NAMED = 100
 LOOK_FOR = "Look for it with {search_for}."
 DOUBTS = {
     RecallDoubt.DOUBTFUL_RECORD: "its record is doubtful",
@@ -60,8 +63,21 @@ def _say_words(evidence: Sequence[MatchEvidence]) -> Iterator[str]:
         yield f"{text} says {', '.join(words)}"
 
 
+MOST_ELSEWHERE = 3
+ELSEWHERE = "{realign_memory} finds out where that lies."
+
+
 def say_advice(recalled: Recall) -> str:
     """Say the verdict with what to do next."""
+    said = _say_verdict(recalled)
+    elsewhere = recalled.elsewhere[:MOST_ELSEWHERE]
+    if not elsewhere:
+        return said
+    names = ", ".join(quote_name(each.name) for each in elsewhere)
+    return f"{said} On another map it is remembered: {names}. {lead(ELSEWHERE)}".rstrip()
+
+
+def _say_verdict(recalled: Recall) -> str:
     answer, candidates = recalled.answer, recalled.candidates
     if not recalled.n_searched:
         if recalled.is_empty:
@@ -129,3 +145,51 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
 
 def _name(candidate: RecallCandidate) -> str:
     return f"{candidate.id} {quote(candidate.name, most=LONGEST_QUOTE)}"
+
+
+def say_places_left(left: Sequence[RememberedPlace], *, first: int) -> Iterator[str]:
+    """Name the places that a page leaves out, and say how to read them.
+
+    Args:
+        first: The number of the first of them.
+    """
+    if not left:
+        return
+    named = ", ".join(
+        f"{each.id} {quote_name(each.waypoint.name)}" for each in left[:MOST_LEFT_NAMED]
+    )
+    n_more = len(left) - MOST_LEFT_NAMED
+    others = f" and {n_more} more" if n_more > 0 else ""
+    yield f"{len(left)} left out, from_row={first} goes on: {named}{others}."
+
+
+def say_forgotten(done: Forgotten, words: str, *, is_undo: bool = False) -> str:
+    """Say what is forgotten, or remembered again, and how to take it back."""
+    parts = [f"the place {quote_name(each)}" for each in done.places]
+    if done.n_landmarks:
+        views = "1 view" if done.n_landmarks == 1 else f"{done.n_landmarks} views"
+        named = ", ".join(map(quote_name, done.seen_from[:MOST_LEFT_NAMED]))
+        parts.append(f"{views} of it, noted at {named}")
+    if not parts:
+        return f"Nothing that was forgotten is called {quote_name(words)}; nothing changed."
+    told = "; ".join(parts)
+    if is_undo:
+        return f"Remembered again: {told}."
+    return lead("Forgotten: {told}. {forget} with undo and its name takes that back.", told=told)
+
+
+def say_gone(label: str, done: Forgotten | None, *, ids: Sequence[str], is_in_record: bool) -> str:
+    """Say what became of a thing that is said to be gone; nothing where only its record had it.
+
+    Args:
+        done: What was forgotten in other records; None where it is not clear which thing is meant.
+        ids: Of the things that may be meant.
+        is_in_record: The record that was just written had it.
+    """
+    named = quote_name(label)
+    if done is not None and done.n_landmarks:
+        return f"{named} ({ids[0]}) is forgotten, as noted at {', '.join(done.seen_from)} too."
+    if len(ids) > 1:
+        meant = ", ".join(ids)
+        return lead("{named} may be {meant}: {forget} takes the id.", named=named, meant=meant)
+    return "" if is_in_record or done is not None else f"Nothing near by is remembered as {named}."

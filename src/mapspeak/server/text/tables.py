@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from mapspeak.memory.quoting import quote
 from mapspeak.places.standing import choose_standing_point, find_standing_point
@@ -221,20 +221,44 @@ def room_tables(view: MapView) -> str:
     return "\n\n".join(["\n".join([rooms, *sizes]), corridors])
 
 
+OF_THESE = " of these"
+
+
 def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
-    """Say which room is the smallest and which the largest, corridors left out."""
-    names = [_say_size(world, room) for room in _rooms_by_size(regions)]
+    """Say which room is the smallest and which the largest, corridors left out.
+
+    Rooms that may be parts of others are not counted, and named apart. Of some of all rooms it is
+    said that these are meant.
+    """
+    rooms = _rooms_by_size(regions)
+    is_of_all = len(rooms) == len(_rooms_by_size(world.rooms.regions))
+    so_far = " so far" if world.may_hide_rooms else ""
+    among = so_far if is_of_all else OF_THESE
+    unsure = [room for room in rooms if world.rooms.find_doubtful_door(room)]
+    sure = [room for room in rooms if room not in unsure]
+    names = [_say_size(world, room) for room in sure]
+    lines = [_say_ranks(names, among) if names or not unsure else "No room is sure yet."]
+    for smallest, second in list(pairwise(sure))[:1]:
+        if smallest.floor_area_m2 + world.growth_m2.get(smallest.id, 0) > second.floor_area_m2:
+            lines.append(f"{smallest.id} may turn out larger than {second.id}.")
+    if unsure:
+        lines.append(f"Unsure: {', '.join(_say_size(world, room) for room in unsure)}.")
+    return " ".join(lines)
+
+
+def _say_ranks(names: Sequence[str], among: str) -> str:
     match names:
         case []:
             return "No rooms among them."
         case [only]:
-            return f"The only room: {only}."
+            return f"The only room{among}: {only}."
         case [smallest, largest]:
-            return f"The smaller room is {smallest}, the larger {largest}."
+            return f"The smaller room{among} is {smallest}, the larger {largest}."
         case [smallest, second, *_, largest]:
+            n = len(names)
+            counted = f"these {n} rooms" if among == OF_THESE else f"{n} rooms{among}"
             return (
-                f"Of {len(names)} rooms the smallest is {smallest}, then {second}; "
-                f"the largest is {largest}."
+                f"Of {counted} the smallest is {smallest}, then {second}; the largest is {largest}."
             )
         case _:
             raise AssertionError(names)
@@ -279,7 +303,7 @@ def _region_row(world: WorldModel, region: Region) -> Sequence[str]:
     return (
         region.id,
         say_kind(region),
-        f"{region.floor_area_m2:.1f}{_say_growing(world, region)}",
+        f"{region.floor_area_m2:.1f}{_say_doubts(world, region)}",
         f"{region.free_area_m2:.1f}",
         f"{region.length_m:.1f} x {region.width_m:.1f}",
         say_point(choose_standing_point(world, region)),
@@ -294,13 +318,23 @@ def _say_door(world: WorldModel, region: Region, door: Door) -> str:
     return f"{door.id}>{other if one == region.id else one}{'' if is_passable else ' (no way)'}"
 
 
-def _say_growing(world: WorldModel, region: Region) -> str:
-    return " (not all seen)" if region.id in world.growing_ids else ""
+def _say_doubts(world: WorldModel, region: Region) -> str:
+    doubts = list(_list_doubts(world, region))
+    return f" ({'; '.join(doubts)})" if doubts else ""
+
+
+def _list_doubts(world: WorldModel, region: Region) -> Iterator[str]:
+    if region.id in world.growth_m2:
+        yield "not all seen"
+    door = world.rooms.find_doubtful_door(region)
+    if door is not None:
+        one, other = door.region_ids
+        yield f"maybe part of {other if one == region.id else one}: {door.id}"
 
 
 def _say_size(world: WorldModel, room: Region) -> str:
-    seen = ", not all seen" if room.id in world.growing_ids else ""
-    return f"{room.id} ({room.floor_area_m2:.1f} m2{seen})"
+    size = ", ".join([f"{room.floor_area_m2:.1f} m2", *_list_doubts(world, room)])
+    return f"{room.id} ({size})"
 
 
 def _rooms_by_size(regions: Sequence[Region]) -> list[Region]:

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from mcp_types import CallToolResult, TextContent
 
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import tell_place
 from mapspeak.places.standing import find_standing_point
 from mapspeak.robot import PoseDoubt
@@ -55,6 +56,8 @@ COMPASS = (
 )
 """The same from the map's x axis on."""
 
+KINDS = {"R": "a room", "C": "a corridor", "O": "an open space"}
+
 
 def say_count(number: int, what: str) -> str:
     """Return "1 goal", "2 goals"."""
@@ -81,12 +84,25 @@ ASSUMED_RADIUS = (
 )
 
 
+def say_elsewhere(memory: SemanticMap) -> list[str]:
+    """Return how much is left out because they are of another map, if anything is."""
+    counts = ((len(memory.elsewhere), "place"), (memory.n_events_elsewhere, "event"))
+    left_out = [say_count(n, what) for n, what in counts if n]
+    if not left_out:
+        return []
+    is_one = sum(n for n, _ in counts) == 1
+    are = f"{' and '.join(left_out)} {'is' if is_one else 'are'}"
+    said = "remembered on another map, and how that lies to this one is not known."
+    return [f"{are} {said} Nothing of it is shown or found here."]
+
+
 def say_warnings(world: WorldModel) -> list[str]:
     """Return what a reader of a map should know first: of the memory, and of the robot's pose."""
     doubt = say_pose_doubt(world.pose_doubt)
     of_pose = [f"The robot's pose is uncertain: {doubt}"] if doubt else []
+    of_memory = say_elsewhere(world.memory)
     of_size = [ASSUMED_RADIUS.format(world.radius_m)] if world.is_radius_assumed else []
-    return [f"Warning: {warning}" for warning in (*world.warnings, *of_pose, *of_size)]
+    return [f"Warning: {warning}" for warning in (*world.warnings, *of_memory, *of_pose, *of_size)]
 
 
 def say_point(point: Point) -> str:
@@ -122,6 +138,14 @@ def say_area(area: ClosedArea) -> str:
     """Return what a closed area is called; the words of an event are not the operator's: quoted."""
     name = shorten(area.name)
     return tell_place(name) if area.event_id else name
+
+
+def say_renamed(renamed: Mapping[str, str]) -> str:
+    """Say what regions are called now that had another id; empty where none had."""
+    return " ".join(
+        f"{old} is called {new} now: it was taken for {KINDS[old[0]]} and is {KINDS[new[0]]}."
+        for old, new in renamed.items()
+    )
 
 
 def say_kind(region: Region) -> str:

@@ -25,9 +25,7 @@ from mapspeak.memory import (
     noted_at,
     tells_what_to_do,
 )
-from mapspeak.memory.things.thing import (
-    name_the_same,
-)
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.server.text.offered import lead
 
 SAME_VIEW_RAD = math.radians(15.0)
@@ -52,8 +50,8 @@ class LandmarkInput(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    label: str = Field(description="what it is", min_length=1, max_length=120)
-    purpose: str | None = Field(default=None, description="used for ...", max_length=200)
+    label: str = Field(min_length=1, max_length=120)
+    purpose: str | None = Field(default=None, max_length=200)
     bearing_deg: float | None = Field(
         default=None, description="from the heading, left positive", allow_inf_nan=False
     )

@@ -1,12 +1,18 @@
 """The tools that move the robot, and those that stop it."""
 
+import math
 from typing import Annotated
 
-from mcp.server.mcpserver import Context
+from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
-from mapspeak.errors import LinkError
+from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.exploration.trips import spread_headings, turn_to
+from mapspeak.errors import GoalError, LinkError
+from mapspeak.robot import CameraPicture, GoalState
+from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.robot import DriveAnswer
+from mapspeak.server.text.drives import say_cause
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.asking import (
@@ -15,6 +21,7 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
+from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
@@ -22,7 +29,7 @@ Place = Annotated[
     str | None,
     Field(
         description="an id (R3, C1, D1, F2, W5, T1), a remembered name or thing, or a phrase: "
-        "left of W3, between D1 and D2, corner of R2"
+        "left of W3, between the two nearest doors, smallest room, R2 looking back through its door"
     ),
 ]
 Metres = Annotated[float | None, Field(description="metres, map frame", allow_inf_nan=False)]
@@ -37,6 +44,27 @@ Wait = Annotated[
     float,
     Field(description="seconds", ge=0, le=LONGEST_WAIT_S),
     AT_MOST_LONGEST_WAIT,
+]
+LEAST_TURN_S = 0.5
+MOST_PICTURES = 12
+OVERLAP_RATIO = 1.1
+"""A thing at the edge of one picture is whole in the next."""
+TurnBy = Annotated[
+    float | None,
+    Field(description="degrees, left positive", ge=-360, le=360, allow_inf_nan=False),
+]
+TurnTo = Annotated[
+    float | None,
+    Field(description="heading to end with, counter-clockwise from +x", allow_inf_nan=False),
+]
+NPictures = Annotated[
+    int | None,
+    Field(
+        description="evenly spread all around; as many as leave no gap when left out",
+        ge=2,
+        le=12,
+        strict=True,
+    ),
 ]
 GoalId = Annotated[str | None, Field(description="such as G1; else the latest")]
 
@@ -65,7 +93,7 @@ class DriveTools:
     ) -> DriveAnswer:
         """Drive the robot to a place: an id, a remembered name, or x and y.
 
-        Use it to go anywhere. The goal is checked first; a refused goal comes with one that works.
+        The goal is checked first; a refused goal comes with one that works.
         Answers `arrived` or, after wait_s, a goal_id. A newer goal replaces the older.
         """
         drives = self._session.drives
@@ -128,3 +156,90 @@ class DriveTools:
         is_over = report.status.state.is_final and self._session.drives.under_way is None
         foreign = await self._session.robot.fetch_foreign_goals() if is_over else ()
         return DriveAnswer.of(report, foreign_goals=foreign)
+
+
+class TurnTools:
+    """Turning in place, with pictures or without."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    @tool(
+        "Turn in place",
+        ToolEffect.MOVES,
+        has_report=True,
+        leads="{look_around} takes pictures to all sides.",
+    )
+    async def turn(
+        self, context: Context, by_deg: TurnBy = None, to_yaw_deg: TurnTo = None
+    ) -> DriveAnswer:
+        """Turn the robot where it stands, by an angle or to a heading.
+
+        Use it to look another way.
+        """
+        if (by_deg is None) == (to_yaw_deg is None):
+            raise GoalError(
+                "A turn is either by an angle or to a heading.",
+                hint="Give by_deg (left positive), or to_yaw_deg.",
+            )
+        yaw_rad = math.radians(to_yaw_deg or 0.0)
+        if by_deg is not None:
+            here = (await self._session.robot.fetch_pose()).pose
+            yaw_rad = here.yaw_rad + math.radians(by_deg)
+        return DriveAnswer.of(await self._turn(context, yaw_rad, LONGEST_WAIT_S))
+
+    @tool(
+        "Look all around",
+        ToolEffect.MOVES,
+        leads="{look_through_camera} takes one picture without moving.",
+    )
+    async def look_around(
+        self, context: Context, n_pictures: NPictures = None
+    ) -> list[str | Image]:
+        """Turn the robot where it stands and take a camera picture at each of several headings.
+
+        Use it to see a whole room.
+        """
+        robot = self._session.robot
+        deadline_s = robot.now_s + LONGEST_WAIT_S
+        first = await look_ahead(self._session)
+        n_pictures = n_pictures or _count_all_around(first.picture)
+        what = f"turn in place for {n_pictures} pictures"
+        errand = Errand(what=what, n_drives=n_pictures - 1, duration_s=LONGEST_WAIT_S)
+        shown: list[str | Image] = [first.text, first.image]
+        for yaw_rad in spread_headings(first.picture.pose.yaw_rad, n_pictures)[1:]:
+            left_s = deadline_s - robot.now_s
+            if left_s < LEAST_TURN_S:
+                return [*shown, _say_rest(yaw_rad, "the time for one call is over")]
+            with on_errand(errand):
+                report = await self._turn(context, yaw_rad, left_s)
+            if report.status.state is not GoalState.ARRIVED:
+                await self._session.drives.cancel(report.drive.goal_id)
+                why = say_cause(report.status.cause) or f"the turn is {report.status.state}"
+                return [*shown, _say_rest(yaw_rad, why)]
+            sighting = await look_ahead(self._session)
+            shown += [sighting.text, sighting.image]
+        return shown
+
+    async def _turn(self, context: Context, yaw_rad: float, wait_s: float) -> DriveReport:
+        return await turn_to(
+            self._session,
+            yaw_rad,
+            wait_s=wait_s,
+            on_progress=tell_progress(context),
+            client=client_of(context),
+        )
+
+
+def _count_all_around(picture: CameraPicture) -> int:
+    """Return how many pictures overlap all around; four where the camera's width is not known."""
+    if picture.horizontal_fov_rad is None:
+        return 4
+    return min(
+        max(math.ceil(OVERLAP_RATIO * math.tau / picture.horizontal_fov_rad), 2), MOST_PICTURES
+    )
+
+
+def _say_rest(yaw_rad: float, why: str) -> str:
+    to_go_on = lead("Call {turn} or {look_around} to go on.")
+    return f"No picture at {math.degrees(yaw_rad):.0f} deg and beyond: {why}. {to_go_on}".rstrip()

@@ -13,7 +13,8 @@ from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.text.findings import say_moved
-from mapspeak.server.text.memory import read_moment
+from mapspeak.server.text.moments import read_past
+from mapspeak.server.text.wording import say_elsewhere
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
@@ -22,7 +23,7 @@ from mapspeak.worldmodel.model import WorldModel
 Query = Annotated[str, Field(description="name or purpose", min_length=1, max_length=300)]
 Near = Annotated[str | None, Field(description="place, within 5 m", max_length=200)]
 Room = Annotated[str | None, Field(description="id", max_length=200)]
-Since = Annotated[str | None, Field(description="since 09:30, 2h ago", max_length=40)]
+Since = Annotated[str | None, Field(description="yesterday, 2h ago", max_length=40)]
 Until = Annotated[str | None, Field(description="seen before", max_length=40)]
 Kind = Annotated[EntryKind | None, Field(description="only these")]
 Count = Annotated[int, Field(description="most", ge=1, le=20, strict=True)]
@@ -35,7 +36,7 @@ class FindTools:
         self._session = session
 
     # Its report is not declared: a schema of answers would cost more than all its arguments.
-    @tool("Find in memory", ToolEffect.READS, leads="Use it before {navigate_to}.")
+    @tool("Find in memory", ToolEffect.READS)
     async def find_place(
         self,
         query: Query,
@@ -46,9 +47,9 @@ class FindTools:
         kind: Kind = None,
         k: Count = 5,
     ) -> CallToolResult:
-        """Find remembered places and things by name or meaning: where, and how sure.
+        """Find a remembered place or thing by name or purpose. Take this first to find anything.
 
-        It says when none or several may be meant.
+        It says where and how sure, or that several may be meant.
         """
         session = self._session
         now = session.find_wall_time()
@@ -56,28 +57,29 @@ class FindTools:
 
         def ask() -> RecallAnswer:
             words, room_id = split_room(world, query)
+            begin, end = read_past(since, until, now)
             wanted = RecallQuery(
                 words=words if room is None else query,
                 near=None if near is None else find_point(world, near),
                 room_id=room_id if room is None else find_room(world, room),
-                since=read_moment(since, now),
-                until=read_moment(until, now),
+                since=begin,
+                until=end,
                 kind=kind,
                 n=k,
             )
             answer = recall(world, wanted)
-            report = RecallAnswer.of(answer, now=now, warnings=world.memory.warnings)
+            report = RecallAnswer.of(
+                answer, now=now, warnings=(*world.memory.warnings, *say_elsewhere(world.memory))
+            )
             if now is None:
                 return report
-            seen = say_reported(
-                session.episodes.store, answer, wanted, map_id=session.memory.map_id, now=now
-            )
+            seen = say_reported(session.find_reported, answer, wanted, now=now)
             advice = f"{report.advice} {seen}".rstrip()
             return report.model_copy(update={"advice": advice})
 
         report = await session.compute(ask)
         await session.keep_vectors()
-        warning = await say_moved(session.compare_map(world.grid))
+        warning = await say_moved(session.compute(session.keeper.compare))
         if warning:
             report = report.model_copy(update={"warnings": [warning, *report.warnings]})
         return CallToolResult(

@@ -1,23 +1,26 @@
 """The paper's five tools, under the paper's names: usable in its order, and each alone."""
 
 import math
-from typing import Annotated
+from collections.abc import Sequence
+from functools import partial
+from typing import Annotated, Any
 
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.memory import TakenPicture, Waypoint, WriteReceipt
+from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall.asking import find_speaking_places
+from mapspeak.places.recall.forgetting import find_gone, forget_thing
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far
-from mapspeak.server.text.recall import say_advice
+from mapspeak.server.text.recall import say_advice, say_gone
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.annotating import Annotator, Landmarks
 from mapspeak.server.tools.sightings import fetch_ring
@@ -31,15 +34,15 @@ from mapspeak.spatial.picture import (
 
 Name = Annotated[
     str,
-    Field(description="how people call it", min_length=1, max_length=120),
+    Field(description="as people say", min_length=1, max_length=120),
 ]
 Feature = Annotated[str, Field(max_length=300)]
 Description = Annotated[str, Field(description="in a sentence or two", max_length=2000)]
 Safety = Annotated[Landmarks | None, Field(description="fixed safety equipment")]
-Functional = Annotated[Landmarks | None, Field(description="fixed things that tasks need")]
+Functional = Annotated[Landmarks | None, Field(description="fixed things tasks need")]
 Features = Annotated[
     list[Feature] | None,
-    Field(max_length=50, description="lasting layout: corridors, walls, openings"),
+    Field(max_length=50, description="lasting layout: walls, openings"),
 ]
 Gone = Annotated[list[Feature] | None, Field(max_length=50, description="labels no longer there")]
 X = Annotated[
@@ -49,7 +52,8 @@ X = Annotated[
 Y = Annotated[float | None, Field(description="metres", allow_inf_nan=False)]
 Degrees = Annotated[float | None, Field(description="degrees", allow_inf_nan=False)]
 Query = Annotated[str | None, Field(description="or by what is there", max_length=200)]
-WaypointName = Annotated[str | None, Field(description="one by name; all when left out")]
+FromRow = Annotated[int, Field(description="row", ge=0)]
+WaypointName = Annotated[str | None, Field(description="one; else all")]
 
 
 class PaperTools:
@@ -115,6 +119,7 @@ class PaperTools:
         and guesses.
         """
         _check_name(name)
+        await self._session.meet_map()
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
         here, doubt = await self._find_robot()
@@ -131,45 +136,38 @@ class PaperTools:
             safety_landmarks=annotator.take(safety_landmarks, pose=pose, picture=picture),
             functional_landmarks=annotator.take(functional_landmarks, pose=pose, picture=picture),
             geometric_features=annotator.take_features(geometric_features or ()),
-            stamp_s=self._session.robot.now_s if picture is None else picture.stamp_s,
-            recorded_at=self._session.find_wall_time() if picture is None else picture.recorded_at,
+            **self._date(picture),
             room_id=await self._find_room_id(pose),
             picture=None if picture is None else picture.name,
         )
         annotator.require_content(waypoint)
-        receipt, merge = await self._session.compute(
-            lambda: self._session.memory.remember(waypoint, gone=gone or ())
-        )
-        kept = await self._session.compute(lambda: self._session.episodes.keep_record(waypoint))
+        session, memory, keeper = self._session, self._session.memory, self._session.keeper
+        receipt, merge = await session.compute(lambda: memory.remember(waypoint, gone=gone or ()))
+        keep = partial(session.episodes.keep_record, waypoint, name_map=memory.name_map)
+        kept = await session.compute(keep)
         unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
-        far, moved = await self._say_far(receipt), await say_moved(self._session.keep_map())
-        places = await self._session.compute(self._session.memory.read)
+        far, moved = await self._say_far(receipt), await say_moved(session.compute(keeper.compare))
+        far += await self._forget_gone(gone, merge, pose)
+        places = await session.compute(memory.read)
         told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
         return WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
 
-    @tool(
-        "Recall remembered places",
-        ToolEffect.READS,
-        has_report=True,
-        leads="{find_place} finds a thing by what it is for.",
-    )
+    @tool("Recall remembered places", ToolEffect.READS, has_report=True)
     async def get_semantic_data(
-        self, name: WaypointName = None, query: Query = None
+        self, name: WaypointName = None, query: Query = None, from_row: FromRow = 0
     ) -> MemoryAnswer:
-        """Recall remembered places with pose, landmarks and layout; they are observations.
-
-        Use it to read a place in full.
-        """
+        """Read remembered places in full, as observed. To find something take {find_place}."""
         if query is None:
             memory = await self._session.compute(self._session.memory.read)
-            return MemoryAnswer.of(memory, name)
+            return MemoryAnswer.of(memory, name, first=from_row)
         if name is not None:
             raise SemanticMapError(
                 "Both name and query were given.", hint="Give the one or the other."
             )
         world = await self._session.fetch_world_model()
         shown, answer = await self._session.compute(lambda: find_speaking_places(world, query))
-        return MemoryAnswer.of_places(world.memory, shown, advice=[say_advice(answer)])
+        advice = [say_advice(answer)]
+        return MemoryAnswer.of_places(world.memory, shown, first=from_row, advice=advice)
 
     async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
         here = await self._session.robot.fetch_pose()
@@ -186,12 +184,35 @@ class PaperTools:
         if annotator.wants_laser(*seen, pose=pose, picture=picture):
             annotator.laser = await fetch_ring(self._session.robot)
 
+    def _date(self, picture: TakenPicture | None) -> dict[str, Any]:
+        """Return when it was seen: when its picture was taken, else now."""
+        if picture is not None:
+            return {"stamp_s": picture.stamp_s, "recorded_at": picture.recorded_at}
+        session = self._session
+        return {"stamp_s": session.robot.now_s, "recorded_at": session.find_wall_time()}
+
     async def _say_far(self, receipt: WriteReceipt) -> list[str]:
         previous, now = receipt.previous, receipt.waypoint
         if previous is None:
             return []
         rooms = [await self._find_room_id(each.pose) for each in (previous, now)]
         return say_far(previous, now, rooms=rooms)
+
+    async def _forget_gone(self, gone: Sequence[str] | None, merge: Merge, pose: Pose) -> list[str]:
+        """Forget what is gone in all records that name it; return what to say of it."""
+        if not gone:
+            return []
+        session = self._session
+        world = await session.fetch_world_model(needs_memory=True)
+        in_record = {name_key(each.label) for each in merge.gone}
+
+        def forget(label: str) -> str:
+            meant = find_gone(world, label, pose.point)
+            done = forget_thing(session.memory, meant[0]) if len(meant) == 1 else None
+            ids = [each.id for each in meant]
+            return say_gone(label, done, ids=ids, is_in_record=name_key(label) in in_record)
+
+        return await session.compute(lambda: [said for each in gone if (said := forget(each))])
 
     async def _require_on_map(self, pose: Pose) -> None:
         try:

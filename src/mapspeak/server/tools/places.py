@@ -6,6 +6,7 @@ from pydantic import Field
 
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.server.reports.robot import GoalAnswer
+from mapspeak.server.text.blocked import describe_blocked
 from mapspeak.server.text.descriptions import describe_place
 from mapspeak.server.text.measures import describe_measures
 from mapspeak.server.tools.toolset import ToolEffect, tool
@@ -16,13 +17,18 @@ MOST_PLACES = 30
 OnePlace = Annotated[
     str,
     Field(
-        description='an id, a remembered name, "robot", "x, y" or "x, y, yaw_deg", "left of W3"',
+        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3", '
+        '"second-smallest room", "R2 looking back through its door"',
         max_length=200,
     ),
 ]
 Places = Annotated[
     list[Annotated[str, Field(max_length=200)]] | None,
-    Field(description="ids, names or points; all rooms when left out", max_length=MOST_PLACES),
+    Field(
+        description='ids, names, points or phrases: "the two nearest doors", "every remembered '
+        'extinguisher"; all rooms when left out',
+        max_length=MOST_PLACES,
+    ),
 ]
 Start = Annotated[str, Field(description="where from", max_length=200)]
 
@@ -47,7 +53,7 @@ class PlaceTools:
     async def measure(self, places: Places = None, start: Start = "robot") -> str:
         """Measure on the map: path and straight distance, the rooms and doors on the way, sizes.
 
-        Use it to compare rooms or doors, and for any way from one place to another; sorted.
+        Use it to compare rooms or doors, and for any way; sorted.
         """
         world = await self._session.fetch_world_model()
         return await self._session.compute(
@@ -72,3 +78,24 @@ class PlaceTools:
             return GoalAnswer.of(goal, room=world.find_room_id(goal.pose.point))
 
         return await self._session.compute(check)
+
+    @tool("What is blocked", ToolEffect.READS)
+    async def what_is_blocked(self) -> str:
+        """Say all that is in the robot's way: closures, rooms without a way, failed goals.
+
+        Each with why and until when. Use it for "is anything blocked?".
+        """
+        session = self._session
+        world = await session.fetch_world_model()
+
+        def describe() -> str:
+            return describe_blocked(
+                world,
+                events=session.recall_events(),
+                failed=session.drives.failed,
+                held_by=None if session.guard is None else session.guard.hold.read(),
+                now=session.find_wall_time(),
+                now_s=session.robot.now_s,
+            )
+
+        return await session.compute(describe)

@@ -28,7 +28,8 @@ ERRAND_S = 1800.0
 Stops = Annotated[
     list[Annotated[str, Field(min_length=1, max_length=200)]] | None,
     Field(
-        description="in order: ids, names, points or phrases; left out to go on",
+        description='in order: ids, names, points or phrases: "all rooms", "every extinguisher"; '
+        "left out to go on",
         max_length=MOST_STOPS,
     ),
 ]

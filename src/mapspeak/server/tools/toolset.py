@@ -75,22 +75,23 @@ class Tool:
 
     @property
     def description(self) -> str:
-        """What a model reads: the docstring, a line for each of its paragraphs, and the leads."""
+        """What a model reads: the docstring, a line for each of its paragraphs, and the leads.
+
+        A sentence that leads to a tool, as "Ask {find_place} first.", is there where that is
+        offered.
+        """
         paragraphs = inspect.cleandoc(self.function.__doc__ or "").split("\n\n")
-        lines = [" ".join(paragraph.split()) for paragraph in paragraphs]
+        lines = [lead(" ".join(paragraph.split())) for paragraph in paragraphs]
         return "\n".join(filter(None, [*lines, lead(self.leads)]))
 
     @property
     def annotations(self) -> ToolAnnotations:
-        """The hints of the MCP specification; of a tool that reads, the others mean nothing."""
+        """The hints of the MCP specification where they are not what it takes for granted."""
         if self.effect is ToolEffect.READS:
             return ToolAnnotations(read_only_hint=True)
-        return ToolAnnotations(
-            read_only_hint=False,
-            destructive_hint=self.effect is ToolEffect.MOVES,
-            idempotent_hint=self.effect is not ToolEffect.MOVES,
-            open_world_hint=False,
-        )
+        if self.effect is ToolEffect.MOVES:
+            return ToolAnnotations(open_world_hint=False)
+        return ToolAnnotations(destructive_hint=False, idempotent_hint=True, open_world_hint=False)
 
     @property
     def meta(self) -> dict[str, Any] | None:
@@ -157,15 +158,8 @@ def lean_input(schema: Schema) -> Schema:
 
 
 def lean_output(schema: Schema) -> Schema:
-    """Return the schema of a report: names carry units, and every field is always there.
-
-    Of what lies within a field only the type is promised: its names stand in every answer.
-    """
-    if schema is None:
-        return None
-    lean = _rewrite(_flatten(schema), _without(("title", "description", "required", "default")))
-    fields = _rewrite(list(lean["properties"].values()), _without(("properties",)))
-    return {**lean, "properties": dict(zip(lean["properties"], fields, strict=True))}
+    """Return the schema of a report: its fields by name, for names carry units and kinds."""
+    return schema and {"type": "object", "properties": {name: {} for name in schema["properties"]}}
 
 
 def _flatten(schema: Schema) -> Schema:

@@ -85,11 +85,18 @@ class _PassageRecord(BaseModel):
     id: str
     at: Position
     width_m: FiniteFloat
+    certainty: FiniteFloat = 1.0
     joins: tuple[str, str]
     line: tuple[Position, Position] | None
 
     def to_passage(self) -> Passage:
-        door = Door(id=self.id, place=Point(*self.at), width_m=self.width_m, region_ids=self.joins)
+        door = Door(
+            id=self.id,
+            place=Point(*self.at),
+            width_m=self.width_m,
+            region_ids=self.joins,
+            certainty=self.certainty,
+        )
         line = None if self.line is None else (Point(*self.line[0]), Point(*self.line[1]))
         return Passage(door=door, line=line)
 
@@ -191,6 +198,7 @@ def _facts_of_door(door: Door) -> Facts:
         "id": door.id,
         "at": _position_of(door.place),
         "width_m": float(door.width_m),
+        "certainty": float(door.certainty),
         "joins": list(door.region_ids),
     }
 

@@ -18,7 +18,7 @@ from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
 STRIP = 3.0
 """So many squares in a row are a strip: something to walk along, not a room."""
-CORRIDOR_LADDER = ((2 * STRIP, 0), (2.5, 3), (2.0, 4), (1.5, 6))
+CORRIDOR_LADDER = ((2 * STRIP, 0), (2.5, 3), (2.0, 4), (1.5, 5), (1.0, 6))
 """Elongation above which a region is a corridor, by the least number of its neighbours.
 
 An L-shaped room is as elongated as a strip, and leads to one or two others. What leads to no more
@@ -26,6 +26,10 @@ is a corridor only if it is a strip, straight (`Shape.is_strip`) or on both side
 """
 ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""
+HALL_WIDTH_M = 10.0
+"""What is as wide as this all along is a hall, wherever it leads."""
+RUN_ON_RATIO = 0.7
+"""A way between two corridors that is as wide as this, beside the wider one, is a bend."""
 OPEN_SPACE_WIDTH_M = 8.0
 OPEN_SPACE_AREA_M2 = 100.0
 
@@ -132,13 +136,14 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
 
 def classify(shape: RegionShape, *, n_neighbours: int) -> RoomClass:
     """Return what a person would call a region."""
-    is_corridor = shape.is_strip or any(
+    leads_on = shape.is_strip or any(
         shape.elongation > elongation and n_neighbours >= least
         for elongation, least in CORRIDOR_LADDER
     )
-    if is_corridor:
+    _, width_m = walked_size(shape)
+    if leads_on and width_m < HALL_WIDTH_M:
         return RoomClass.CORRIDOR
-    is_wide = 2 * shape.region.clearance_m >= OPEN_SPACE_WIDTH_M
+    is_wide = leads_on or 2 * shape.region.clearance_m >= OPEN_SPACE_WIDTH_M
     is_open = is_wide and shape.region.floor_area_m2 >= OPEN_SPACE_AREA_M2
     return RoomClass.OPEN_SPACE if is_open else RoomClass.ROOM
 
@@ -154,9 +159,8 @@ def walked_size(shape: RegionShape) -> tuple[float, float]:
 
 _REACH_M = 0.3
 """Border cells nearer than this to each other are one opening."""
-_LEAST_M = 0.25
-"""A narrower gap is a crack in the map of a wall: no person and hardly a robot gets through."""
-_ROUNDING_M = 1e-3
+_LEAST_M = 0.4
+"""A narrower gap is a crack in the map of a wall: nobody gets through, and hardly a robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,6 +171,7 @@ class Opening:
     second: int
     place: Point
     width_m: float
+    certainty: float
 
 
 def find_openings(segmentation: Segmentation) -> list[Opening]:
@@ -178,7 +183,9 @@ def find_openings(segmentation: Segmentation) -> list[Opening]:
     for here in np.split(order, starts) if order.size else ():
         pair = int(first[here[0]]), int(second[here[0]])
         openings += _split(segmentation, pair, row[here], col[here])
-    return [opening for opening in openings if opening.width_m >= _LEAST_M - _ROUNDING_M]
+    # Between the middles of cells and walls an opening is up to a cell too narrow.
+    least_m = _LEAST_M - segmentation.raster.cell_size_m
+    return [opening for opening in openings if opening.width_m >= least_m]
 
 
 def _border_cells(labels: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
@@ -222,6 +229,7 @@ def _split(
                 second=pair[1],
                 place=segmentation.raster.point_at(rows[best] + 0.5, cols[best] + 0.5),
                 width_m=2 * float(clearance.max()),
+                certainty=round(1 - segmentation.doubts.get(pair, 0.0), 3),
             )
         )
     return sorted(openings, key=lambda opening: -opening.width_m)
@@ -243,12 +251,54 @@ def find_rooms(
     """
     raster = build_raster(grid)
     segmentation = segment(raster)
-    openings = find_openings(segmentation)
-    shapes = measure_regions(segmentation)
-    labels = _labels_on_grid(raster, segmentation.labels)
+    shapes, openings = measure_regions(segmentation), find_openings(segmentation)
+    joined = join_corridors(segmentation, shapes, openings)
+    if joined is not segmentation:
+        segmentation = joined
+        shapes, openings = measure_regions(segmentation), find_openings(segmentation)
+    labels = labels_on_grid(raster, segmentation.labels)
     regions, doors = _name(shapes, openings)
     current = RoomMap(grid=grid, labels=labels, regions=regions, doors=doors)
     return current if previous is None else match_rooms(previous, current)
+
+
+def join_corridors(
+    segmentation: Segmentation, shapes: list[RegionShape], openings: list[Opening]
+) -> Segmentation:
+    """Make corridors that run on into one another, round a bend or past pillars, one."""
+    classes = _classify_all(shapes, openings)
+    number = np.arange(len(shapes) + 1)
+    for opening in openings:
+        one, other = opening.first - 1, opening.second - 1
+        if classes[one] is classes[other] is RoomClass.CORRIDOR:
+            width_m = max(walked_size(shapes[i])[1] for i in (one, other))
+            if opening.width_m >= RUN_ON_RATIO * width_m:
+                joined = number[[opening.first, opening.second]]
+                number[number == joined.max()] = joined.min()
+    if np.array_equal(number, np.arange(len(number))):
+        return segmentation
+    labels = number[segmentation.labels]
+    n_cells = np.bincount(labels.ravel(), minlength=len(number))
+    n_cells[0] = labels.size + 1
+    by_size = np.argsort(-n_cells, kind="stable")
+    rank = np.argsort(by_size, kind="stable").astype(np.int32)
+    doubts: dict[tuple[int, int], float] = {}
+    for pair, share in segmentation.doubts.items():
+        one, other = sorted(rank[number[list(pair)]].tolist())
+        if one != other:
+            doubts[one, other] = max(share, doubts.get((one, other), 0.0))
+    return replace(segmentation, labels=rank[labels], doubts=doubts)
+
+
+def _classify_all(shapes: list[RegionShape], openings: list[Opening]) -> list[RoomClass]:
+    behind: list[set[int]] = [set() for _ in shapes]
+    for opening in openings:
+        behind[opening.first - 1].add(opening.second)
+        behind[opening.second - 1].add(opening.first)
+    return [
+        classify(shape, n_neighbours=len(others))
+        for shape, others in zip(shapes, behind, strict=True)
+    ]
 
 
 def _name(
@@ -261,10 +311,7 @@ def _name(
         for one, other in permutations((opening.first - 1, opening.second - 1)):
             behind[one].add(other)
             door_ids[one].append(f"D{number}")
-    classes = [
-        classify(shape, n_neighbours=len(others))
-        for shape, others in zip(shapes, behind, strict=True)
-    ]
+    classes = _classify_all(shapes, openings)
     ids = [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
     regions = []
     for index, (shape, room_class) in enumerate(zip(shapes, classes, strict=True)):
@@ -284,6 +331,7 @@ def _name(
             id=f"D{number}",
             place=opening.place,
             width_m=opening.width_m,
+            certainty=opening.certainty,
             region_ids=(ids[opening.first - 1], ids[opening.second - 1]),
         )
         for number, opening in enumerate(openings, start=1)
@@ -291,7 +339,7 @@ def _name(
     return tuple(regions), doors
 
 
-def _labels_on_grid(raster: Raster, labels: NDArray[np.int32]) -> Labels:
+def labels_on_grid(raster: Raster, labels: NDArray[np.int32]) -> Labels:
     """Take raster labels to the cells of the grid."""
     grid = raster.grid
     full = np.zeros(grid.cells.shape, np.int16)

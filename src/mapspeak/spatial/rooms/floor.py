@@ -26,7 +26,6 @@ class Floor:
         solid: 1 where nothing is free, furniture left out, else 0.
         directions_deg: The main directions of the walls, from 0 to 90 degrees.
         clearance_m: How far each floor cell is from what is not floor.
-        standing_m: The same with the furniture in its place; None where no block was left out.
     """
 
     floor: Picture
@@ -35,23 +34,18 @@ class Floor:
     solid: Picture
     directions_deg: list[float]
     clearance_m: NDArray[np.float32]
-    standing_m: NDArray[np.float32] | None
 
 
 def build_floor(raster: Raster) -> Floor:
     """Return the floor with its furniture cleared away."""
     directions = find_wall_directions(raster.occupied, least_ratio=SETTINGS.direction_ratio)
     wall, obstacle = find_walls(raster, directions)
-    pocket = SETTINGS.pocket_area_m2 / raster.cell_area_m2
     block, behind = find_blocks(raster, wall, directions[0] if directions else 0.0)
-    standing_m = None
-    if block.any():
-        with_blocks = _clear(raster.free, raster.occupied, wall, pocket)
-        standing_m = _clearance(with_blocks, raster.cell_size_m)
     wall, obstacle = (part & (1 - block) | behind for part in (wall, obstacle))
     free = raster.free | block
     occupied = (raster.occupied & (1 - block)) | behind
-    floor = _clear(free, occupied, wall, pocket)
+    floor = free | (occupied & (1 - wall))
+    floor |= _find_pockets(floor, wall, SETTINGS.pocket_area_m2 / raster.cell_area_m2)
     # Parts that nothing joins and that are too small for a room are none.
     floor = drop_specks(floor, SETTINGS.room_area_m2 / raster.cell_area_m2)
     return Floor(
@@ -61,14 +55,7 @@ def build_floor(raster: Raster) -> Floor:
         solid=1 - free,
         directions_deg=directions,
         clearance_m=_clearance(floor, raster.cell_size_m),
-        standing_m=standing_m,
     )
-
-
-def _clear(free: Picture, occupied: Picture, wall: Picture, largest_pocket: float) -> Picture:
-    """Return the floor under all that is no wall, small unseen pockets included."""
-    floor = free | (occupied & (1 - wall))
-    return floor | _find_pockets(floor, wall, largest_pocket)
 
 
 def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:

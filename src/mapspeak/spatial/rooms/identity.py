@@ -92,7 +92,7 @@ def _match_regions(
     """Return the final id for each id of the current map."""
     old = {region.index: region.id for region in previous.regions}
     new = {region.index: region.id for region in current.regions}
-    rows, cols = np.nonzero(overlap[1:, 1:])
+    rows, cols = np.nonzero(_keeps_enough(overlap)[1:, 1:])
     same = match_best_first(
         (-overlap[before, now], before, now)
         for before, now in zip((rows + 1).tolist(), (cols + 1).tolist(), strict=True)
@@ -102,6 +102,17 @@ def _match_regions(
     ids |= _revive_regions(previous, [each for each in current.regions if each.index not in same])
     missing = [name for name in new.values() if name not in ids]
     return ids | _fresh(missing, _used(previous))
+
+
+def _keeps_enough(overlap: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return True where a new region has so much of an old one's floor that it may be that.
+
+    What has less is another one, unless no other region has more of it.
+    """
+    shared = overlap.copy()
+    shared[:, 0] = 0.0
+    needed = np.minimum(_REMAINS_RATIO * shared.sum(axis=1), shared.max(axis=1))
+    return np.asarray((shared > 0) & (shared >= needed[:, np.newaxis]))
 
 
 def _revive_regions(previous: RoomMap, regions: list[Region]) -> dict[str, str]:

@@ -36,25 +36,15 @@ class RoomSettings:
         direction_ratio: A main direction has at least this share of the strongest one's edges.
         pocket_area_m2: Unseen areas up to this size inside a room count as floor.
         smoothing_m: Standard deviation of the smoothing of clearances.
-        same_width_ratio: Neighbouring places whose clearances differ less are one place.
-        door_width_m: The widest narrow place that can divide two rooms.
-        door_ratio: A narrow place in a wall divides if its half width is at most this share of
-            the clearance of the narrower side.
-        gap_ratio: The same for a narrow place with no wall in line with it.
-        least_door_m: A narrower place is a gap beside furniture, or a door that is hardly open.
-        leaf_width_m: Doors up to this width divide however wide the places behind them are.
-        wide_ratio: A wider one divides if its half width is also at most this share of the
-            clearance of the wider side.
-        stub_m: The shortest piece of wall that makes an opening wider than a leaf, in line with
-            it, a door whatever the clearances.
+        door_width_m: The widest opening between wall ends that is looked at as a door.
+        leaf_width_m: A narrower one shows in the clearances.
+        stub_m: The shortest piece of wall, in line with such an opening, that is a jamb of it.
         tip_m: The thickest such piece.
-        frame_m: The length of wall in line with a narrow place that makes it fully a door.
-        mouth_width_m: The widest end of a corridor that opens straight into a wider place.
-        mouth_ratio: Clearance of such a corridor over that of the wider place, at most.
-        mouth_elongation: Area over the square of its width that makes it a corridor.
-        mouth_area_m2: The smallest such corridor.
+        join_share: Places are joined that nothing divides with at least this certainty.
         room_area_m2: Smaller regions belong to their neighbour.
-        niche_area_m2: The same for a region whose border has no wall in line with it.
+        part_area_m2: The same for a region that is hardly seen yet.
+        least_clearance_m: Half as wide as a region must be somewhere.
+        half_seen_share: Of such a region at least so much of the outline is not seen.
     """
 
     cell_size_m: float = 0.05
@@ -71,22 +61,15 @@ class RoomSettings:
     direction_ratio: float = 0.2
     pocket_area_m2: float = 2.0
     smoothing_m: float = 0.1
-    same_width_ratio: float = 0.8
-    door_width_m: float = 2.4
-    door_ratio: float = 0.8
-    gap_ratio: float = 0.5
-    least_door_m: float = 0.6
+    door_width_m: float = 3.5
     leaf_width_m: float = 1.0
-    wide_ratio: float = 0.6
     stub_m: float = 0.3
     tip_m: float = 0.25
-    frame_m: float = 2.5
-    mouth_width_m: float = 3.0
-    mouth_ratio: float = 0.5
-    mouth_elongation: float = 3.0
-    mouth_area_m2: float = 4.0
+    join_share: float = 0.45
     room_area_m2: float = 1.5
-    niche_area_m2: float = 4.0
+    part_area_m2: float = 0.5
+    least_clearance_m: float = 0.2
+    half_seen_share: float = 0.1
 
 
 SETTINGS = RoomSettings()

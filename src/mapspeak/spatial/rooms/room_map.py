@@ -22,6 +22,14 @@ class RoomClass(StrEnum):
     OPEN_SPACE = "open_space"
 
 
+SURE = 0.9
+"""A region is sure whose doors are all so certain.
+
+In drawn buildings that nothing was fitted on, .99 of such regions were right, and of the others
+.60; with clutter .98 and .51, with a part unseen .93 and .58.
+"""
+BESIDE_RATIO = 0.5
+"""A smaller neighbour, beside a region's own floor, would hardly change it."""
 LETTER = {RoomClass.ROOM: "R", RoomClass.CORRIDOR: "C", RoomClass.OPEN_SPACE: "O"}
 
 
@@ -63,12 +71,14 @@ class Door:
     Attributes:
         id: "D4"; the same from call to call once regions were matched.
         place: The middle of its narrowest line.
+        certainty: How sure it is that two regions meet there and not parts of one, 0 to 1.
     """
 
     id: str
     place: Point
     width_m: float
     region_ids: tuple[str, str]
+    certainty: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,6 +176,17 @@ class RoomMap:
     def doors_of(self, region: Region) -> tuple[Door, ...]:
         """Return the doors that lead out of a region."""
         return tuple(door for door in self.doors if region.id in door.region_ids)
+
+    def find_doubtful_door(self, region: Region) -> Door | None:
+        """Return the door that least surely divides a region from a neighbour of some size."""
+        least_m2 = (1 + BESIDE_RATIO) * region.floor_area_m2
+        areas_m2 = {each.id: each.floor_area_m2 for each in self.regions}
+        doubtful = [
+            door
+            for door in self.doors_of(region)
+            if door.certainty < SURE and sum(map(areas_m2.__getitem__, door.region_ids)) > least_m2
+        ]
+        return min(doubtful, key=lambda door: door.certainty, default=None)
 
     def doors_between(self, first_id: str, second_id: str) -> tuple[Door, ...]:
         """Return the doors that join two regions."""

@@ -4,20 +4,27 @@ Such openings are too wide, beside the rooms behind, for clearances to see.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.floor import Floor, build_floor, cut_away
-from mapspeak.spatial.rooms.merging import (
-    BasinLabels,
-    Frames,
-    Saddle,
+from mapspeak.spatial.rooms.basins import (
+    Basins,
+    Passes,
     build_basins,
-    find_saddles,
-    merge_basins,
+    describe_passes,
+    find_passes,
+)
+from mapspeak.spatial.rooms.borders import PlaceGraph
+from mapspeak.spatial.rooms.floor import Floor, build_floor, cut_away
+from mapspeak.spatial.rooms.joining import (
+    join_places,
+    judge_left,
+    load_judge,
+    number_by_area,
 )
 from mapspeak.spatial.rooms.raster import (
     SETTINGS,
@@ -233,8 +240,6 @@ Labels = NDArray[np.int32]
 
 _CUT_CELLS = 2
 """Basins would leak through a thinner line that runs askew."""
-_BESIDE_M = 0.3
-"""How far off the middle of a doorway a place is on one side of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -244,50 +249,46 @@ class Segmentation:
     Attributes:
         floor: The floor of it, without furniture.
         labels: 0 for no room, else from 1, the largest room first.
+        doubts: How sure it is that nothing divides two rooms, 0 to 1; the smaller number first.
     """
 
     raster: Raster
     floor: Floor
     labels: Labels
+    doubts: Mapping[tuple[int, int], float]
 
 
 def segment(raster: Raster) -> Segmentation:
-    """Cut the floor at its narrow places, and at the doorways that these do not show."""
+    """Divide the floor of a raster into rooms."""
     floor = build_floor(raster)
-    labels = _divide(floor, floor, [], raster)
-    unseen = find_doorways(raster, floor)
-    beside = round(_BESIDE_M / raster.cell_size_m)
-    doorways: list[Doorway] = []
-    # A cut changes the clearances, by which other doorways were seen: so look again.
-    while missed := [doorway for doorway in unseen if _is_inside(doorway, labels, beside)]:
-        doorways += missed
-        unseen = [doorway for doorway in unseen if doorway not in missed]
-        cut = _draw(doorways, floor.floor)
-        cut_floor = cut_away(floor, cut, raster.cell_size_m)
-        labels = _divide(floor, cut_floor, doorways, raster)
-        labels = _fill(labels, cut)
-    return Segmentation(raster=raster, floor=floor, labels=labels)
+    doorways = find_doorways(raster, floor)
+    cut = draw_cuts(doorways, floor.floor)
+    basins, passes = find_borders(raster, floor, doorways, cut)
+    graph = PlaceGraph(basins, passes, raster)
+    judge = load_judge()
+    join_places(graph, judge)
+    number = number_by_area(graph)
+    doubts = {
+        (min(pair), max(pair)): share
+        for places, share in judge_left(graph, judge).items()
+        if 0 not in (pair := number[list(places)].tolist())
+    }
+    labels = fill_cuts(number[basins.labels], cut)
+    return Segmentation(raster=raster, floor=floor, labels=labels, doubts=doubts)
 
 
-def _divide(
-    floor: Floor,
-    cut_floor: Floor,
-    doorways: list[Doorway],
-    raster: Raster,
-) -> Labels:
-    """Return room numbers; basins end where the floor has been cut at the doorways."""
-    sigma = SETTINGS.smoothing_m / raster.cell_size_m
-    height = _smooth(cut_floor.clearance_m, cut_floor.floor, sigma)
-    standing = floor.standing_m
-    basins = build_basins(height, cut_floor.floor)
-    saddles = find_saddles(basins, height) + _find_saddles_at(doorways, basins)
-    return merge_basins(
-        basins,
-        height,
-        height if standing is None else _smooth(standing, floor.floor, sigma),
-        sorted(saddles, key=lambda saddle: -saddle.height),
-        frames=Frames(floor, raster.cell_size_m),
-        cell_area_m2=raster.cell_area_m2,
+def find_borders(
+    raster: Raster, floor: Floor, doorways: list[Doorway], cut: Picture
+) -> tuple[Basins, Passes]:
+    """Return the basins of a floor that has been cut at its doorways, and the ways between them."""
+    size_m = raster.cell_size_m
+    cut_floor = cut_away(floor, cut, size_m)
+    heights = _smooth(cut_floor.clearance_m, cut_floor.floor, SETTINGS.smoothing_m / size_m)
+    basins = build_basins(heights, cut_floor.floor)
+    passes = find_passes(basins, floor, size_m), _find_passes_at(doorways, basins, floor, size_m)
+    return basins, Passes(
+        pairs=np.concatenate([part.pairs for part in passes]),
+        values=np.concatenate([part.values for part in passes]),
     )
 
 
@@ -296,7 +297,7 @@ def _smooth(clearance_m: NDArray[np.float32], floor: Picture, sigma: float) -> N
     return np.where(floor > 0, smooth, np.float32(0))
 
 
-def _draw(doorways: list[Doorway], floor: Picture) -> Picture:
+def draw_cuts(doorways: list[Doorway], floor: Picture) -> Picture:
     """Return 1 on the floor between the jambs, and on jambs that were taken for furniture."""
     cut = np.zeros_like(floor)
     for doorway in doorways:
@@ -305,35 +306,34 @@ def _draw(doorways: list[Doorway], floor: Picture) -> Picture:
     return cut & floor
 
 
-def _find_saddles_at(doorways: list[Doorway], basins: BasinLabels) -> list[Saddle]:
-    saddles = []
+def _find_passes_at(
+    doorways: list[Doorway], basins: Basins, floor: Floor, cell_size_m: float
+) -> Passes:
+    """Return the ways across the cuts, which no basin leads through."""
+    cells: list[tuple[int, int]] = []
+    half_m = []
     for doorway in doorways:
-        one, other = (_first_number(doorway, basins, side) for side in (-1, 1))
-        if 0 != one != other != 0:
-            row, col = doorway.beside(0)
-            saddles.append(
-                Saddle(
-                    height=doorway.width_m / 2,
-                    first=min(one, other),
-                    second=max(one, other),
-                    row=row,
-                    col=col,
-                    is_doorway=True,
-                )
-            )
-    return saddles
+        one, other = (_first_cell(doorway, basins.labels, side) for side in (-1, 1))
+        numbers = _number_at(basins.labels, one), _number_at(basins.labels, other)
+        if 0 != numbers[0] != numbers[1] != 0:
+            flat = [row * basins.labels.shape[1] + col for row, col in (one, other)]
+            cells.append((flat[0], flat[1]) if numbers[0] < numbers[1] else (flat[1], flat[0]))
+            half_m.append(doorway.width_m / 2)
+    widths_m = np.array(half_m, np.float64)
+    return describe_passes(
+        basins,
+        floor,
+        np.array(cells, np.intp).reshape(-1, 2).T,
+        half_m=widths_m,
+        contact_m=2 * widths_m,
+        cell_size_m=cell_size_m,
+    )
 
 
-def _first_number(doorway: Doorway, numbers: Labels, side: int) -> int:
-    """Return the first number that is not 0 on one side of a doorway that has been cut."""
-    found = (_number_at(numbers, doorway.beside(side * off)) for off in range(1, 3 * _CUT_CELLS))
-    return next(filter(None, found), 0)
-
-
-def _is_inside(doorway: Doorway, labels: Labels, cells: int) -> bool:
-    """Return True if both sides of a doorway belong to one region."""
-    one, other = (_number_at(labels, doorway.beside(off)) for off in (-cells, cells))
-    return one == other > 0
+def _first_cell(doorway: Doorway, numbers: Labels, side: int) -> tuple[int, int]:
+    """Return the first cell with a number on one side of a doorway that has been cut."""
+    places = [doorway.beside(side * off) for off in range(1, 3 * _CUT_CELLS)]
+    return next((place for place in places if _number_at(numbers, place) > 0), places[0])
 
 
 def _number_at(numbers: Labels, place: tuple[int, int]) -> int:
@@ -342,7 +342,7 @@ def _number_at(numbers: Labels, place: tuple[int, int]) -> int:
     return int(numbers[row, col]) if is_inside else 0
 
 
-def _fill(labels: Labels, cut: Picture) -> Labels:
+def fill_cuts(labels: Labels, cut: Picture) -> Labels:
     """Add the cells of a cut to the regions beside it."""
     rows, cols = (places + 1 for places in find_cells(cut > 0))
     framed = cv2.copyMakeBorder(labels, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)

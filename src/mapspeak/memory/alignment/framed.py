@@ -1,0 +1,197 @@
+"""A memory as it is on the robot's map: every pose in its frame, and what cannot be placed apart.
+
+This is the one place where records of other maps are held back: what is not aligned with the
+robot's map is no waypoint, no event and no thing to whoever reads here.
+"""
+
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+
+from mapspeak.geometry import Pose
+from mapspeak.memory.alignment.keeping import FrameKeeper
+from mapspeak.memory.episodes.observation import MapPlacing
+from mapspeak.memory.events import Event
+from mapspeak.memory.frames import FrameId, Frames
+from mapspeak.memory.merging import Merge
+from mapspeak.memory.store.memorystore import MemoryStore, WriteReceipt
+from mapspeak.memory.walls import KeptWalls
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
+from mapspeak.spatial import OccupancyGrid
+
+MOST_KEPT = 4
+"""So many moved records are kept for each that there is."""
+
+
+class FramedMemory:
+    """A memory store whose reader and writer are on the robot's map.
+
+    Attributes:
+        store: Where the records are, each in its own frame.
+        keeper: Which frame the robot's map is in.
+    """
+
+    def __init__(
+        self,
+        store: MemoryStore,
+        *,
+        name_robot: Callable[[], str] = str,
+        lock: AbstractContextManager[object] | None = None,
+    ) -> None:
+        self.store = store
+        self.keeper = FrameKeeper(store, name_robot=name_robot, lock=lock)
+        self._moved: dict[int, tuple[Waypoint, Pose, Waypoint]] = {}
+
+    @property
+    def path(self) -> Path:
+        """As of the store."""
+        return self.store.path
+
+    @property
+    def walls(self) -> KeptWalls:
+        """As of the store."""
+        return self.store.walls
+
+    @property
+    def map_id(self) -> str | None:
+        """As of the store."""
+        return self.store.map_id
+
+    def meet(self, grid: OccupancyGrid) -> None:
+        """Find out which frame the robot's map is in (see `FrameKeeper.meet`)."""
+        self.keeper.meet(grid)
+
+    def read(self) -> SemanticMap:
+        """Return the remembered places in the frame of the robot's map; others are elsewhere.
+
+        Before there is a map, all are given as they are: they lead nowhere without one.
+        """
+        memory = self.store.read().present()
+        if not self.keeper.has_met:
+            return memory
+        here: list[Waypoint] = []
+        elsewhere: list[Waypoint] = []
+        for waypoint in memory.waypoints:
+            placed = self._place(waypoint, memory.frames)
+            (elsewhere if placed is None else here).append(placed or waypoint)
+        if len(self._moved) > MOST_KEPT * max(len(memory.waypoints), 1):
+            self._moved.clear()  # Most are of records that read otherwise by now.
+        return replace(
+            memory,
+            waypoints=tuple(here),
+            elsewhere=tuple(elsewhere),
+            n_events_elsewhere=len(self.store.read_events()) - len(self.read_events()),
+        )
+
+    def read_events(self) -> tuple[Event, ...]:
+        """Return the events in the frame of the robot's map, and no others.
+
+        What people wrote down without metres, in a file that is of no known map, counts
+        everywhere: a closed way that is kept open is worse than an open one that is closed.
+        """
+        events = self.store.read_events()
+        if not self.keeper.has_met:
+            return events
+        frames = self.store.read().frames
+        return tuple(filter(None, (self._place_event(each, frames) for each in events)))
+
+    def _place_event(self, event: Event, frames: Frames) -> Event | None:
+        here, keeper = self.keeper.frame, self.keeper
+        if keeper.is_placed and event.frame == here:
+            return event
+        motion = frames.find_transform(of=event.frame, into=here) if keeper.is_placed else None
+        if motion is not None:
+            return replace(event.moved(motion), frame=here)
+        has_metres = event.at is not None or bool(event.outlines)
+        is_of_no_map = event.frame is None and not keeper.has_walls(None)
+        return event if is_of_no_map and not has_metres else None
+
+    def name_map(self) -> str | None:
+        """Return what the map of the robot is called in observations; begin a frame where needed.
+
+        Raises:
+            SemanticMapError: A new frame cannot be written.
+        """
+        frame_id = self.keeper.place()
+        frame = None if frame_id is None else self.store.read().frames.by_id.get(frame_id)
+        return self.map_id if frame is None else frame.observed_map
+
+    def place_maps(self) -> tuple[MapPlacing, ...] | None:
+        """Return how the maps of observations lie to the robot's; None before there is one."""
+        if not self.keeper.has_met:
+            return None
+        memory, here = self.store.read(), self.keeper.frame
+        own = dict.fromkeys((None, memory.map_id, self.map_id))
+        named: list[tuple[FrameId, str | None]] = [(None, name) for name in own]
+        named += [(frame.id, frame.observed_map) for frame in memory.frames.items]
+        placings = []
+        for frame_id, name in named if self.keeper.is_placed else ():
+            motion = memory.frames.find_transform(of=frame_id, into=here)
+            if motion is not None:
+                placings.append(MapPlacing(name, motion))
+        return tuple(placings)
+
+    def read_entry(self, key: str) -> str | None:
+        """As of the store."""
+        return self.store.read_entry(key)
+
+    def write(self, waypoint: Waypoint) -> WriteReceipt:
+        """Write a waypoint that is in the frame of the robot's map."""
+        return self._received(self.store.write(self._in_frame(waypoint)))
+
+    def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
+        """Write many waypoints, each in the frame that it names."""
+        self.store.write_all(change)
+
+    def write_event(self, event: Event) -> Event:
+        """Write an event that is in the frame of the robot's map."""
+        written = self.store.write_event(replace(event, frame=self.keeper.place()))
+        return next(each for each in self.read_events() if each.id == written.id)
+
+    def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
+        """As of the store."""
+        return self.store.write_frames(change)
+
+    def remember(
+        self, waypoint: Waypoint, *, gone: Iterable[str] = ()
+    ) -> tuple[WriteReceipt, Merge]:
+        """Join a waypoint that is in the frame of the robot's map with what is remembered."""
+        receipt, merge = self.store.remember(self._in_frame(waypoint), gone=gone)
+        return self._received(receipt), merge
+
+    def remove(self, name: str) -> Waypoint | None:
+        """As of the store."""
+        return self.store.remove(name)
+
+    def _in_frame(self, waypoint: Waypoint) -> Waypoint:
+        return replace(waypoint, frame=self.keeper.place())
+
+    def _place(self, waypoint: Waypoint, frames: Frames) -> Waypoint | None:
+        """Return a waypoint in the frame of the robot's map; None where that is not known."""
+        here = self.keeper.frame
+        if not self.keeper.is_placed:
+            return None
+        if waypoint.frame == here:
+            return waypoint
+        motion = frames.find_transform(of=waypoint.frame, into=here)
+        if motion is None:
+            return None
+        known = self._moved.get(id(waypoint))
+        if known is None or known[0] is not waypoint or known[1] != motion:
+            known = (waypoint, motion, replace(waypoint.moved(motion), frame=here))
+            self._moved[id(waypoint)] = known
+        return known[2]
+
+    def _received(self, receipt: WriteReceipt) -> WriteReceipt:
+        frames = self.store.read().frames
+        waypoint = self._place(receipt.waypoint, frames)
+        before = receipt.previous and self._place(receipt.previous, frames)
+        # The room that it was seen from just now is one of the robot's map.
+        room_id = receipt.waypoint.room_id
+        assert waypoint is not None  # noqa: S101 - it was just written in this frame or one aligned
+        return replace(
+            receipt,
+            waypoint=replace(waypoint, room_id=room_id).present(),
+            previous=before and before.present(),
+        )

@@ -1,0 +1,151 @@
+"""The frames of a second memory among those of a first one, aligned by their kept walls."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mapspeak.geometry import Pose
+from mapspeak.memory.alignment.comparing import MapRelation, compare_maps
+from mapspeak.memory.alignment.keeping import KEY
+from mapspeak.memory.frames import FrameId, Frames, MapFrame
+from mapspeak.memory.store.document import MapDocument
+from mapspeak.memory.walls import OWN_WALLS, WallFolder
+from mapspeak.spatial import OccupancyGrid
+
+STILL = Pose(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mount:
+    """How a second memory's frames are called in the whole.
+
+    Attributes:
+        frames: Of the whole.
+        ids: What each frame of the second memory is called, its own one as None.
+        walls: The maps to keep beside the whole, by their names.
+        finding: How the two memories' own frames lie, in words.
+    """
+
+    frames: Frames
+    ids: Mapping[FrameId, FrameId]
+    walls: Mapping[str, OccupancyGrid]
+    finding: str
+
+    def rename_map(self, map_id: str | None, *, whole_map_id: str | None) -> str | None:
+        """Return what a map of the second memory's observations is called in the whole."""
+        _, mark, of_frame = (map_id or "").rpartition("#")
+        frame_id = self.ids.get(of_frame if mark and of_frame in self.ids else None)
+        frame = None if frame_id is None else self.frames.by_id[frame_id]
+        return whole_map_id if frame is None else frame.observed_map
+
+
+def mount(first: MapDocument, second: MapDocument, *, paths: tuple[Path, Path]) -> Mount:
+    """Lay the frames of a second memory beside those of a first one.
+
+    The second memory's own frame becomes the first's where the walls of both lie alike or, without
+    walls, where both name the same map. Otherwise it stays a frame of its own, with its pose where
+    the walls tell it surely.
+
+    Raises:
+        SemanticMapError: A kept map is damaged.
+    """
+    mine, theirs = dict(_find_kept(first, paths[0])), dict(_find_kept(second, paths[1]))
+    found = _find_motion(theirs[None], mine) if None in theirs else None
+    has_no_walls = None not in mine or None not in theirs
+    is_named = has_no_walls and first.map_id is not None and first.map_id == second.map_id
+    if is_named or (found is not None and found[1] == STILL):
+        ids: dict[FrameId, FrameId] = {None: None if found is None else found[0]}
+        frames, finding = first.frames, ""
+    else:
+        own = MapFrame(id=first.frames.free_id(), map_id=second.map_id)
+        frames, ids = first.frames.added(own), {None: own.id}
+        finding = (
+            "The second memory is of another map, or nothing tells how it lies: it stays apart, "
+            f"as the frame {own.id}."
+        )
+        if found is not None:
+            frames = frames.aligned(own.id, found[0], motion=found[1])
+            finding = (
+                f"The second memory's map lies turned by {math.degrees(found[1].yaw_rad):.1f} "
+                f"degrees, its origin at ({found[1].x:.2f}, {found[1].y:.2f}), as its walls tell."
+            )
+    for frame in second.frames.items:
+        ids[frame.id] = frames.free_id()
+        frames = frames.added(MapFrame(id=frames.free_id()))
+    for frame in second.frames.items:
+        frames = frames.changed(
+            ids[frame.id] or "",
+            map_id=frame.map_id,
+            robot=frame.robot,
+            pose=frame.pose,
+            reference=ids.get(frame.reference, frame.reference),
+        )
+    return _with_walls(frames, ids, mine, theirs, finding)
+
+
+def _with_walls(
+    frames: Frames,
+    ids: Mapping[FrameId, FrameId],
+    mine: Mapping[FrameId, OccupancyGrid],
+    theirs: Mapping[FrameId, OccupancyGrid],
+    finding: str,
+) -> Mount:
+    """Return the mount with a name for each kept map; of two of one frame the first's is kept."""
+    kept = {ids[frame_id]: grid for frame_id, grid in theirs.items()} | dict(mine)
+    walls = {}
+    for number, (frame_id, grid) in enumerate(kept.items(), start=2):
+        name = OWN_WALLS if frame_id is None else f"map-{number}.yaml"
+        walls[name] = grid
+        if frame_id is not None:
+            frames = frames.changed(frame_id, walls=name)
+    return Mount(frames=frames, ids=ids, walls=walls, finding=finding)
+
+
+def _find_motion(
+    kept: OccupancyGrid, others: Mapping[FrameId, OccupancyGrid]
+) -> tuple[FrameId, Pose] | None:
+    """Return the frame on whose walls a kept map surely lies, and how; best without a motion."""
+    compared = {frame_id: compare_maps(kept, other) for frame_id, other in others.items()}
+    for frame_id, comparison in compared.items():
+        if comparison.relation is MapRelation.SAME:
+            return frame_id, STILL
+    for frame_id, comparison in compared.items():
+        if comparison.relation is MapRelation.MOVED and comparison.fit is not None:
+            return frame_id, comparison.fit.new_from_old
+    return None
+
+
+def _find_kept(document: MapDocument, path: Path) -> Iterator[tuple[FrameId, OccupancyGrid]]:
+    folder = WallFolder(path)
+    named = ((frame.id, frame.walls) for frame in document.frames.items)
+    for frame_id, name in ((None, document.find_entry(KEY) or OWN_WALLS), *named):
+        grid = None if name is None else folder.load(name)
+        if grid is not None:
+            yield frame_id, grid
+
+
+def renamed(document: MapDocument, ids: Mapping[FrameId, FrameId]) -> MapDocument:
+    """Return a memory whose records and events call their frames as the whole does."""
+    return replace(
+        document,
+        records={
+            key: replace(
+                record,
+                waypoint=replace(
+                    record.waypoint,
+                    frame=ids.get(record.waypoint.frame, record.waypoint.frame),
+                    map_id=None,
+                ),
+            )
+            for key, record in document.records.items()
+        },
+        events={
+            key: replace(
+                record,
+                event=replace(record.event, frame=ids.get(record.event.frame, record.event.frame)),
+            )
+            for key, record in document.events.items()
+        },
+        map_id=None,
+    )

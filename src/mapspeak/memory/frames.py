@@ -1,0 +1,120 @@
+"""Frames that records were made in, and how they lie to each other.
+
+A memory has a frame of its own, which has no id (None) and no entry: records belong to it unless
+they name another one. Every other frame is `{id, map, robot, walls, pose, in}`. Its pose is that of
+its origin in the frame `in`, the memory's own where it names none; without a pose nothing is known
+of how it lies.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose
+
+FrameId = str | None
+"""None is the memory's own frame."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapFrame:
+    """A frame beside the memory's own.
+
+    Attributes:
+        map_id: The name of the map whose frame it is, where it has one.
+        robot: Which robot made the map.
+        walls: The name of the kept map that shows its walls; None where none was worth keeping.
+        pose: Of its origin in the frame `reference`; None while that is not known.
+    """
+
+    id: str
+    map_id: str | None = None
+    robot: str | None = None
+    walls: str | None = None
+    pose: Pose | None = None
+    reference: FrameId = None
+
+    @property
+    def observed_map(self) -> str:
+        """What observations call the map of this frame: "house#F2"."""
+        return f"{self.map_id or ''}#{self.id}"
+
+
+@dataclass(frozen=True)
+class Frames:
+    """All frames of a memory beside its own: forests of frames whose relation is known."""
+
+    items: tuple[MapFrame, ...] = ()
+
+    @cached_property
+    def by_id(self) -> Mapping[str, MapFrame]:
+        """Each frame under its id."""
+        return {frame.id: frame for frame in self.items}
+
+    def find_root(self, frame_id: FrameId) -> tuple[FrameId, Pose]:
+        """Return the last frame that a frame is known to lie in, and its pose there.
+
+        A frame that has no entry is a root of its own; frames that lie in each other have none
+        in common with others.
+        """
+        pose, seen = Pose(0.0, 0.0), {frame_id}
+        while frame_id is not None:
+            frame = self.by_id.get(frame_id)
+            if frame is None or frame.pose is None or frame.reference in seen:
+                break
+            pose, frame_id = frame.pose @ pose, frame.reference
+            seen.add(frame_id)
+        return frame_id, pose
+
+    def find_transform(self, *, of: FrameId, into: FrameId) -> Pose | None:
+        """Return the transform that moves poses of a frame into another, or None."""
+        if of == into:
+            return Pose(0.0, 0.0)
+        (root, pose), (other_root, other_pose) = self.find_root(of), self.find_root(into)
+        return other_pose.inverse() @ pose if root == other_root else None
+
+    def added(self, frame: MapFrame) -> "Frames":
+        """Return them with another frame."""
+        return Frames((*self.items, frame))
+
+    def changed(self, frame_id: str, **entries: object) -> "Frames":
+        """Return them with one frame that says something else."""
+        return Frames(
+            tuple(
+                replace(each, **entries) if each.id == frame_id else each  # type: ignore[arg-type]  # as replace takes them
+                for each in self.items
+            )
+        )
+
+    def aligned(self, of: FrameId, into: FrameId, *, motion: Pose) -> "Frames":
+        """Return them with one relation more: of two frames that had none so far.
+
+        Args:
+            of: The one frame; all that lie in the same root follow it.
+            into: The other frame.
+            motion: Moves poses of the one into the other.
+
+        Raises:
+            SemanticMapError: The frame has no entry.
+        """
+        (root, pose), (other_root, other_pose) = self.find_root(of), self.find_root(into)
+        other_from_root = other_pose @ motion @ pose.inverse()
+        if root is None:
+            # The memory's own frame lies in no other.
+            root, other_root = other_root, root
+            other_from_root = other_from_root.inverse()
+        if root is None or root not in self.by_id:
+            message = f"The memory says nothing of its frame {root}."
+            raise SemanticMapError(message, hint="Add it to the list `frames` of the file.")
+        return self.changed(root, pose=other_from_root, reference=other_root)
+
+    def free_id(self) -> str:
+        """Return an id that no frame has yet: F2, F3, ..."""
+        number = len(self.items) + 2
+        while f"F{number}" in self.by_id:
+            number += 1
+        return f"F{number}"
+
+
+NO_FRAMES = Frames()

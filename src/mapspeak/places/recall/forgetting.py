@@ -1,0 +1,79 @@
+"""Which records a person means who says that something is to be forgotten, or is gone."""
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.memory import MemoryStore
+from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_views, view_of
+from mapspeak.places.naming import AmbiguousPlaceError, find_things
+from mapspeak.places.recall.nearby import THING_ID
+from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+
+AROUND_M = 5.0
+"""What somebody says is gone was no farther from where the robot looks."""
+
+
+def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:
+    """Forget a place, or a thing in all records that name it.
+
+    Args:
+        words: An id, the name of a place, or the label of a thing.
+
+    Raises:
+        SemanticMapError: Nothing is called so, or it cannot be written.
+        AmbiguousPlaceError: Several things are.
+    """
+    place = _find_place(world, words)
+    if place is not None:
+        return forget_place(store, place.waypoint.name)
+    called = _find_things(world, words)
+    if not called:
+        raise SemanticMapError(
+            f"Nothing is remembered as {words[:80]!r}.", hint="Give its id, such as T4 or W2."
+        )
+    if len(called) > 1:
+        ids = [each.id for each in called]
+        raise AmbiguousPlaceError(
+            f"{len(called)} remembered things are called {words[:80]!r}: {', '.join(ids)}.",
+            hint="Give the id of the one that is meant.",
+            words=words,
+            meanings=ids,
+        )
+    return forget_thing(store, called[0])
+
+
+def find_gone(world: WorldModel, words: str, here: Point) -> list[RememberedThing]:
+    """Return the things that somebody means who says, looking from a point, that it is gone."""
+    called = _find_things(world, words)
+    if THING_ID.fullmatch(words.strip()):
+        return called
+    return [
+        each
+        for each in called
+        if each.thing.position is not None and each.thing.position.distance_to(here) <= AROUND_M
+    ]
+
+
+def forget_thing(store: MemoryStore, remembered: RememberedThing) -> Forgotten:
+    """Forget a thing, whatever records name it."""
+    views = {view_of(each.waypoint, each.landmark) for each in remembered.thing.supporting}
+    return forget_views(store, views)
+
+
+def _find_place(world: WorldModel, words: str) -> RememberedPlace | None:
+    wanted = words.strip().casefold()
+    return next(
+        (
+            each
+            for each in world.places
+            if wanted in (each.id.casefold(), each.waypoint.name.casefold())
+        ),
+        None,
+    )
+
+
+def _find_things(world: WorldModel, words: str) -> list[RememberedThing]:
+    if THING_ID.fullmatch(words.strip()):
+        found = world.recollection.find_thing(words.strip().upper())
+        return [] if found is None else [found]
+    return find_things(world, words)

@@ -1,0 +1,273 @@
+"""Things of a kind in an order: the nearest, the second-smallest, all of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.memory import name_key
+from mapspeak.places.naming import MOST_NAMED, AmbiguousPlaceError, Place, split_room
+from mapspeak.places.relations.grammar import Several, Superlative
+from mapspeak.places.relations.placement import refuse
+from mapspeak.places.relations.referents import ROBOT, Referent
+from mapspeak.places.relations.vocabulary import Kind, Order, say_order
+from mapspeak.places.standing import cells_of
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.paths import DistanceField
+from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+
+Sized = Region | Door | Frontier
+
+CLASSES = {
+    Kind.CORRIDOR: (RoomClass.CORRIDOR,),
+    Kind.ROOM: (RoomClass.ROOM,),
+    Kind.OPEN_SPACE: (RoomClass.OPEN_SPACE,),
+}
+SIZED_CLASSES = {**CLASSES, Kind.ROOM: (RoomClass.ROOM, RoomClass.OPEN_SPACE)}
+"""A large room is an open space: it counts where all rooms are meant, or their sizes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """A thing of a kind, with what it is ordered by: metres by path, or its size."""
+
+    value: float
+    thing: Sized | RememberedPlace
+
+    @property
+    def place(self) -> Place:
+        """The same as a place."""
+        return Place(self.thing.id, self.thing)
+
+
+def find_superlative(world: WorldModel, words: Superlative, start: Referent | None) -> Place:
+    """Find the thing of a kind that is the nearest, the second-smallest and so on.
+
+    Args:
+        start: From where ways are measured; None for the robot.
+
+    Raises:
+        GoalError: There are too few of them.
+    """
+    order, rank = words.order, words.rank
+    if order.is_of_size:
+        ranked, unsure = _sort_by_size(world, words.kind, order)
+    else:
+        ranked, unsure = _sort_by_way(world, words.kind, order, start), ()
+    if not ranked:
+        raise refuse(_say_none(world, words.kind))
+    title = say_order(order, rank)
+    if rank > len(ranked):
+        works = [f"{say_order(order, n + 1)} {words.kind}" for n in range(len(ranked))]
+        only = "is only one" if len(ranked) == 1 else f"are only {len(ranked)}"
+        raise refuse(f"There {only} {words.kind}, so none is the {title}.", works)
+    found = ranked[rank - 1]
+    if order.is_of_size:
+        reason = _say_size(world, found, len(ranked), f"the {title}", words.kind, unsure)
+    else:
+        counted = f" of {len(ranked)} that can be reached" if order is Order.FARTHEST else ""
+        reason = f"the {title} {words.kind}{counted}, {_say_way(world, found, start)}"
+    return Place(found.thing.id, found.thing, reason)
+
+
+def find_several(world: WorldModel, words: Several, at: Referent | None) -> tuple[Place, ...]:
+    """Find all things of a kind or of a name, or the first in an order; () for an unused name.
+
+    Args:
+        at: The room they are of, or from where ways are measured.
+
+    Raises:
+        GoalError: There are too few, or it has no meaning where they are asked for.
+    """
+    if words.kind is None:
+        return tuple(Place(each.id, each) for each in _find_all_called(world, words.label))
+    if words.count is None:
+        found = [each for each in _list_all(world, words.kind) if _is_at(world, each, at)]
+        if not found:
+            raise refuse(_say_none(world, words.kind))
+        return tuple(Place(each.id, each) for each in found)
+    if words.order.is_of_size:
+        ranked, _ = _sort_by_size(world, words.kind, words.order)
+    else:
+        ranked = _sort_by_way(world, words.kind, words.order, at)
+    if words.count > len(ranked):
+        raise refuse(
+            f"There are only {len(ranked)} of the kind {words.kind} that this can mean.",
+            [each.thing.id for each in ranked[:MOST_NAMED]],
+        )
+    return tuple(each.place for each in ranked[: words.count])
+
+
+def _find_all_called(world: WorldModel, words: str) -> list[RememberedThing]:
+    """Find things by their name or its end: "extinguishers" are fire extinguishers too."""
+    label, room_id = split_room(world, words)
+    called = world.recollection.find_called(label)
+    end = f" {name_key(label).removesuffix('s')}"
+    return [
+        each
+        for each in world.things
+        if each in called or f" {name_key(each.thing.label).removesuffix('s')}".endswith(end)
+        if room_id is None or room_id in world.rooms_before(each)
+    ]
+
+
+def require_one(words: str, found: Sequence[Place]) -> Place:
+    """Return the place that words mean.
+
+    Raises:
+        AmbiguousPlaceError: They mean several.
+    """
+    if len(found) == 1:
+        return found[0]
+    ids = [each.name for each in found]
+    shown = " ".join(ids[:MOST_NAMED]) + (" ..." if len(ids) > MOST_NAMED else "")
+    raise AmbiguousPlaceError(
+        f"{words[:80]!r} means {len(found)} places, and here one is wanted.",
+        hint=f"They are {shown}. Give the id of one.",
+        words=words,
+        meanings=ids,
+    )
+
+
+def find_all_near(world: WorldModel, kind: Kind) -> tuple[Place, ...]:
+    """Find all things of a kind that the robot can get to, nearest first."""
+    return tuple(each.place for each in _sort_by_way(world, kind, Order.NEAREST, None))
+
+
+def _sort_by_way(
+    world: WorldModel, kind: Kind, order: Order, start: Referent | None
+) -> list[Ranked]:
+    """Return the things of a kind that can be reached, each with its metres by path."""
+    distances = world.distances if start is None else world.map.distances_from(start.anchor)
+    own = None if start is None else (start.region or start.door)
+    ranked = []
+    for each in _list_near(world, kind):
+        far_m = _measure_way(world, each, distances)
+        if each is not own and far_m is not None and np.isfinite(far_m):
+            ranked.append(Ranked(far_m, each))
+    sign = -1 if order is Order.FARTHEST else 1
+    return sorted(ranked, key=lambda each: sign * each.value)
+
+
+def _list_near(world: WorldModel, kind: Kind) -> Sequence[Sized | RememberedPlace]:
+    match kind:
+        case Kind.FRONTIER:
+            return world.frontiers.frontiers
+        case Kind.DOOR:
+            return world.rooms.doors
+        case Kind.REMEMBERED:
+            return world.places
+        case _:
+            regions = world.rooms.regions
+            return tuple(each for each in regions if each.room_class in CLASSES[kind])
+
+
+def _list_all(world: WorldModel, kind: Kind) -> Sequence[Sized | RememberedPlace]:
+    if kind not in SIZED_CLASSES:
+        return _list_near(world, kind)
+    regions = world.rooms.regions
+    return tuple(each for each in regions if each.room_class in SIZED_CLASSES[kind])
+
+
+def _measure_way(
+    world: WorldModel, thing: Sized | RememberedPlace, distances: DistanceField
+) -> float | None:
+    """Return the metres by path to a thing, of a region to its nearest floor."""
+    match thing:
+        case Region() as region:
+            reached_m = distances.distances_at(*cells_of(world.rooms, region))
+            return float(reached_m.min(initial=np.inf))
+        case Door() as door:
+            point = world.find_crossing(door)
+            return None if point is None else distances.distance_to(point)
+        case Frontier(pose=pose):
+            return distances.distance_to(pose.point)
+        case RememberedPlace(waypoint=waypoint):
+            return distances.distance_to(waypoint.pose.point)
+
+
+def _sort_by_size(
+    world: WorldModel, kind: Kind, order: Order
+) -> tuple[list[Ranked], tuple[str, ...]]:
+    """Return the things of a kind in the order of their size, and the ids of those left out.
+
+    Rooms that may be parts of others are left out, unless all are such.
+
+    Raises:
+        GoalError: Things of the kind have no size.
+    """
+    if kind is Kind.REMEMBERED:
+        raise refuse("A remembered place has no size.", ["nearest remembered place"])
+    found = [(_size_of(each), each) for each in _list_all(world, kind) if _is_sized(each)]
+    sure = [(size, each) for size, each in found if not _is_unsure(world, each)]
+    unsure = tuple(each.id for _, each in found if _is_unsure(world, each)) if sure else ()
+    sign = -1 if order is Order.LARGEST else 1
+    ranked = [Ranked(size, each) for size, each in sure or found]
+    return sorted(ranked, key=lambda each: sign * each.value), unsure
+
+
+def _is_sized(thing: Sized | RememberedPlace) -> bool:
+    return not isinstance(thing, RememberedPlace)
+
+
+def _size_of(thing: Sized | RememberedPlace) -> float:
+    match thing:
+        case Region(floor_area_m2=area_m2) | Frontier(gain_m2=area_m2):
+            return area_m2
+        case Door(width_m=width_m):
+            return width_m
+        case RememberedPlace():
+            return 0.0
+
+
+def _is_unsure(world: WorldModel, thing: Sized | RememberedPlace) -> bool:
+    return isinstance(thing, Region) and world.rooms.find_doubtful_door(thing) is not None
+
+
+def _is_at(world: WorldModel, thing: Sized | RememberedPlace, at: Referent | None) -> bool:
+    """Return True for what belongs to a region: its doors, what was remembered or ends in it."""
+    if at is None:
+        return True
+    if at.region is None:
+        raise refuse(f"{at.name} is no room or corridor.")
+    match thing:
+        case Door(region_ids=region_ids):
+            return at.region.id in region_ids
+        case Region(neighbour_ids=neighbour_ids):
+            return at.region.id in neighbour_ids
+        case Frontier(pose=pose):
+            return world.find_room_id(pose.point) == at.region.id
+        case RememberedPlace(waypoint=waypoint):
+            return world.find_room_id(waypoint.pose.point) == at.region.id
+
+
+def _say_size(
+    world: WorldModel, found: Ranked, n_all: int, title: str, kind: Kind, unsure: Sequence[str]
+) -> str:
+    thing = found.thing
+    unit = "m wide" if isinstance(thing, Door) else "m2"
+    digits = 2 if isinstance(thing, Door) else 1
+    so_far = " so far" if isinstance(thing, Region) and world.may_hide_rooms else ""
+    said = f"{title} of {n_all} {kind}s{so_far}, {found.value:.{digits}f} {unit}"
+    if n_all == 1:
+        said = f"the only {kind}{so_far}, {found.value:.{digits}f} {unit}"
+    if isinstance(thing, Region) and thing.id in world.growth_m2:
+        said += ", not all seen"
+    if isinstance(thing, Region) and _is_unsure(world, thing):
+        said += ", unsure"
+    return f"{said}; unsure ones are left out: {', '.join(unsure)}" if unsure else said
+
+
+def _say_way(world: WorldModel, found: Ranked, start: Referent | None) -> str:
+    who = ROBOT if start is None else start.name
+    at = world.robot.point if start is None else start.anchor
+    is_in = found.thing.id == world.find_room_id(at)
+    return f"{who} is in it" if is_in else f"{found.value:.1f} m by path from {who}"
+
+
+def _say_none(world: WorldModel, kind: Kind) -> str:
+    if kind is Kind.FRONTIER:
+        return f"There is no frontier to go to: {str(world.frontiers.verdict).replace('_', ' ')}."
+    return f"There is no {kind} that the robot can get to."

@@ -1,0 +1,83 @@
+"""What an answer tells besides: what was remembered before, and ids that mean something else."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from mcp_types import CallToolResult, TextContent
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.memory import SemanticMap
+from mapspeak.places.naming import REGION_ID, find_renamed
+from mapspeak.server.text.memory import say_loaded
+from mapspeak.server.text.wording import say_renamed
+from mapspeak.session import Session
+
+
+class Remarks:
+    """What each client has to be told that it did not ask for.
+
+    Args:
+        session: Whose memory it is.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._found: dict[str, SemanticMap | None] = {}
+
+    async def meet(self, client: str) -> None:
+        """Note what is remembered before the first call of a client."""
+        if client not in self._found:
+            try:
+                self._found[client] = await self._session.compute(self._session.memory.read)
+            except SemanticMapError:
+                # The tools tell what is wrong with it.
+                self._found[client] = None
+
+    async def tell(
+        self, client: str, arguments: Mapping[str, Any], answer: CallToolResult
+    ) -> CallToolResult:
+        """Put first what became of ids that were named, and what was found at first contact."""
+        answer = await self._tell_found(client, answer)
+        renamed = await self.say_renamed(arguments)
+        if not renamed:
+            return answer
+        line = TextContent(type="text", text=renamed)
+        return answer.model_copy(update={"content": [line, *answer.content]})
+
+    async def say_renamed(self, arguments: Mapping[str, Any]) -> str:
+        """Say which regions that arguments name are called otherwise now; empty where none is."""
+        world, words = self._session.world, " ".join(_list_texts(arguments))
+        if world is None or not REGION_ID.search(words):
+            return ""
+        return say_renamed(await self._session.compute(lambda: find_renamed(world, words)))
+
+    async def _tell_found(self, client: str, answer: CallToolResult) -> CallToolResult:
+        """Add to the first answer that knows the map what was found; before a text, after data."""
+        memory, found = self._session.memory, self._found.get(client)
+        if found is None or not memory.keeper.has_met:
+            return answer
+        self._found[client] = None
+        now = self._session.find_wall_time()
+        placed = await self._session.compute(memory.read)
+        robot = self._session.robot.description.name
+        said = say_loaded(found, placed, robot=robot, now=now)
+        if not said:
+            return answer
+        line = TextContent(type="text", text=said)
+        is_data = isinstance(answer.structured_content, Mapping)
+        content = [*answer.content, line] if is_data else [line, *answer.content]
+        return answer.model_copy(update={"content": content})
+
+
+def _list_texts(value: object) -> Iterator[str]:
+    """Return all texts of arguments, keys too."""
+    match value:
+        case str():
+            yield value
+        case Mapping():
+            for key, each in value.items():
+                yield str(key)
+                yield from _list_texts(each)
+        case list():
+            for each in value:
+                yield from _list_texts(each)

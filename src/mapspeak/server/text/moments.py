@@ -1,0 +1,188 @@
+"""Times as people and models write them, read by the operator's clock."""
+
+import re
+from datetime import datetime, time, timedelta
+from types import MappingProxyType
+
+from mapspeak.errors import SemanticMapError
+
+AHEAD = "2026-11-20T09:30, 09:30, 3 pm, tomorrow 8:00, in 2h, now"
+PAST = "2026-11-20, 2026-11-20T09:30, 09:30, 2h ago, last 10 min, yesterday, this morning, Monday"
+"""What schemas and hints say that can be written; all of it is read."""
+
+_SPAN = re.compile(
+    r"(?P<ahead>in\s+)?(?P<back>(?:the\s+)?(?:last|past)\s+)?(?P<n>\d{1,6}(?:\.\d+)?|an?|)\s*"
+    r"(?P<unit>s(?:ec(?:ond)?s?)?|m(?:in(?:ute)?s?)?|h(?:(?:ou)?rs?)?|d(?:ays?)?|w(?:eeks?)?)"
+    r"(?P<past>\s+ago)?",
+    re.IGNORECASE,
+)
+_CLOCK = re.compile(
+    r"(?:at\s+)?(?P<hour>\d{1,2})(?:[:.](?P<minute>\d\d))?\s*(?P<half>[ap]\.?m\.?)?", re.IGNORECASE
+)
+_UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
+_DAYS = {"day before yesterday": -2, "yesterday": -1, "today": 0, "tomorrow": 1}
+_WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+_DAY = re.compile(
+    rf"(?:on\s+)?(?:(?P<which>last|next|this)\s+)?(?P<day>{'|'.join((*_DAYS, *_WEEKDAYS))})"
+    r"(?:\s+(?P<rest>.+))?"
+)
+_PART_ALONE = re.compile(r"(?:this|in the)\s+(?P<part>morning|noon|afternoon|evening|night)")
+_NIGHTS = {"tonight": "today night", "last night": "yesterday night"}
+_PARTS = MappingProxyType(
+    {"morning": (5, 12), "noon": (12, 13), "afternoon": (12, 18), "evening": (18, 23)}
+)
+"""Hours from and to which a part of a day lasts."""
+_NIGHT_HOURS = (22, 6)
+_HALF_DAY_H = 12
+
+Period = tuple[datetime, datetime | None]
+"""The first moment, and the first one after; None for a single moment."""
+
+
+def read_moment(
+    text: str | None, now: datetime | None, *, is_ahead: bool = False
+) -> datetime | None:
+    """Return the moment that is meant, in the zone of `now` where none is said.
+
+    Args:
+        text: As `AHEAD` or `PAST` say, or "2h" without a direction; of a period such as
+            "yesterday", its beginning. None for no moment.
+        now: The operator's time, or another moment to count from; None where it is not known.
+        is_ahead: True where a span without a direction is counted from now on, and a time of day
+            that is over is tomorrow's.
+
+    Raises:
+        SemanticMapError: It is no moment, or counted from a clock that is not known.
+    """
+    period = _read_period(text, now, is_ahead=is_ahead)
+    return None if period is None else period[0]
+
+
+def read_past(
+    since: str | None, until: str | None, now: datetime | None
+) -> tuple[datetime | None, datetime | None]:
+    """Return from when to when, as two texts say it.
+
+    "Yesterday" or "this morning" alone is the whole of it; as `until` it is its end.
+
+    Raises:
+        SemanticMapError: As `read_moment`.
+    """
+    begin, end = _read_period(since, now), _read_period(until, now)
+    if end is not None:
+        return (begin and begin[0]), end[1] or end[0]
+    return (begin and begin[0]), (begin and begin[1])
+
+
+def read_coming(
+    begins: str | None, ends: str | None, now: datetime
+) -> tuple[datetime | None, datetime | None]:
+    """Return from when to when, of what is to come; of 22:00 to 06:00 the second is the next day.
+
+    Raises:
+        SemanticMapError: As `read_moment`.
+    """
+    start = read_moment(begins, now, is_ahead=True)
+    is_clock = ends is not None and _CLOCK.fullmatch(ends.strip()) is not None
+    after = start if start is not None and is_clock else now
+    return start, read_moment(ends, after, is_ahead=True)
+
+
+def _read_period(
+    text: str | None, now: datetime | None, *, is_ahead: bool = False
+) -> Period | None:
+    if text is None:
+        return None
+    if now is None:
+        raise SemanticMapError(
+            "The time by the calendar is not known here.", hint="Leave times out."
+        )
+    words = " ".join(text.split())
+    try:
+        for read in (_read_span, _read_day, _read_clock):
+            period = read(words.casefold(), now, is_ahead)
+            if period is not None:
+                return period
+        moment = datetime.fromisoformat(words)
+    except (ValueError, OverflowError) as error:
+        raise SemanticMapError(
+            f"{text[:40]!r} is no time.",
+            hint=f"Write it as one of {AHEAD if is_ahead else PAST}.",
+        ) from error
+    begin = moment if moment.tzinfo else moment.replace(tzinfo=now.tzinfo)
+    is_day = len(words) <= len("2026-11-20")
+    return begin, begin + timedelta(days=1) if is_day else None
+
+
+def _read_span(words: str, now: datetime, is_ahead: bool) -> Period | None:  # noqa: FBT001 - read alike
+    """Read "2h ago", "in 2h", "last 10 min"."""
+    if words == "now":
+        return now, None
+    said = _SPAN.fullmatch(words)
+    if said is None or (not said["n"] and not said["back"]):
+        return None
+    if said["ahead"] and (said["past"] or said["back"]):
+        raise ValueError(words)
+    number = float(said["n"]) if said["n"][:1].isdigit() else 1.0
+    span = timedelta(**{_UNITS[said["unit"][0]]: number})
+    is_later = said["ahead"] or (is_ahead and not said["past"] and not said["back"])
+    return (now + span if is_later else now - span), None
+
+
+def _read_day(words: str, now: datetime, is_ahead: bool) -> Period | None:  # noqa: FBT001 - read alike
+    """Read "yesterday", "this morning", "last night", "Monday 9:30", "tomorrow evening"."""
+    words = _NIGHTS.get(words, _PART_ALONE.sub(r"today \g<part>", words))
+    said = _DAY.fullmatch(words)
+    if said is None:
+        return None
+    midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
+    away = _days_away(said["day"], said["which"], midnight.weekday(), is_ahead=is_ahead)
+    day, rest = midnight + timedelta(days=away), said["rest"]
+    if rest is None:
+        return day, day + timedelta(days=1)
+    if rest == "night":
+        return _hours(day, _NIGHT_HOURS[0], 24 + _NIGHT_HOURS[1])
+    if rest in _PARTS:
+        return _hours(day, *_PARTS[rest])
+    clock = _find_clock(rest)
+    return None if clock is None else (datetime.combine(day, clock, now.tzinfo), None)
+
+
+def _days_away(day: str, which: str | None, weekday: int, *, is_ahead: bool) -> int:
+    """Return how many days a named one is from today; of "Monday" the last or the next one."""
+    if day in _DAYS:
+        return _DAYS[day]
+    away = (_WEEKDAYS.index(day) - weekday) % 7
+    if which == "next":
+        return away or 7
+    if which == "last":
+        return away - 7
+    return away if is_ahead or which == "this" or not away else away - 7
+
+
+def _hours(day: datetime, begin_h: int, end_h: int) -> Period:
+    return day + timedelta(hours=begin_h), day + timedelta(hours=end_h)
+
+
+def _read_clock(words: str, now: datetime, is_ahead: bool) -> Period | None:  # noqa: FBT001 - read alike
+    """Read "9:30", "3 pm", "noon", "midnight"."""
+    clock = _find_clock(words)
+    if clock is None:
+        return None
+    moment = datetime.combine(now, clock, now.tzinfo)
+    return (moment + timedelta(days=1) if is_ahead and moment <= now else moment), None
+
+
+def _find_clock(words: str) -> time | None:
+    named = {"noon": time(12), "midnight": time(0)}
+    if words in named:
+        return named[words]
+    said = _CLOCK.fullmatch(words)
+    if said is None or not (said["minute"] or said["half"]):
+        return None
+    hour = int(said["hour"])
+    if said["half"]:
+        if not 1 <= hour <= _HALF_DAY_H:
+            raise ValueError(words)
+        hour = hour % _HALF_DAY_H + (_HALF_DAY_H if said["half"][0] == "p" else 0)
+    return time(hour, int(said["minute"] or 0))

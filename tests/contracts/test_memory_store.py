@@ -1,0 +1,329 @@
+"""What every memory of places promises, wherever it keeps them."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory import Landmark, MemoryStore, SemanticMapStore, Waypoint
+from mapspeak.memory.events import Effect, Event
+from mapspeak.memory.frames import Frames, MapFrame
+from mapspeak.memory.postgres import PostgresStore
+from mapspeak.spatial import OccupancyGrid
+from postgres_server import PostgresServer, run_postgres
+
+OpenStore = Callable[[str | None], MemoryStore]
+"""Opens one memory once more, as another program would, for a robot on a map."""
+
+
+@pytest.fixture(params=["file", pytest.param("postgres", marks=pytest.mark.postgres)])
+def open_store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[OpenStore]:
+    if request.param == "file":
+        yield lambda map_id: SemanticMapStore(tmp_path / "places.yaml", map_id=map_id)
+        return
+    address = request.getfixturevalue("postgres").new_database()
+    with ExitStack() as opened:
+
+        def open_database(map_id: str | None) -> PostgresStore:
+            store = PostgresStore(address, path=tmp_path / "places.yaml", map_id=map_id)
+            return opened.enter_context(closing(store))
+
+        yield open_database
+
+
+@pytest.fixture(scope="module")
+def postgres() -> Iterator[PostgresServer]:
+    with TemporaryDirectory() as folder, run_postgres(Path(folder)) as server:
+        yield server
+
+
+@pytest.fixture
+def store(open_store: OpenStore) -> MemoryStore:
+    return open_store("b1")
+
+
+HOSE, TAP = Landmark(label="hose"), Landmark(label="tap")
+
+
+def place(name: str, x: float = 1.0, *things: Landmark) -> Waypoint:
+    return Waypoint(name=name, pose=Pose(x, 2.0, 0.0), functional_landmarks=things)
+
+
+def names(store: MemoryStore) -> list[str]:
+    return [place.name for place in store.read().waypoints]
+
+
+# --- writing and reading ---------------------------------------------------------------------
+
+
+def test_a_memory_that_was_never_written_to_is_empty(store: MemoryStore) -> None:
+    assert store.read().waypoints == ()
+    assert store.read_events() == ()
+    assert store.read_entry("snapshot") is None
+
+
+def test_a_new_name_creates_a_waypoint(store: MemoryStore) -> None:
+    receipt = store.write(place("dock"))
+
+    assert receipt.previous is None
+    assert receipt.waypoint.name == "dock"
+    assert store.read().waypoints == (receipt.waypoint,)
+    assert receipt.waypoint.map_id == "b1"
+
+
+def test_a_known_name_updates_its_waypoint_whatever_its_case(store: MemoryStore) -> None:
+    first = store.write(place("Dock", 1.0)).waypoint
+    store.write(place("hall"))
+
+    receipt = store.write(place(" dock", 5.0))
+
+    assert receipt.previous == first
+    assert names(store) == ["dock", "hall"]
+    assert store.read().waypoints[0].pose.x == 5.0
+
+
+def test_what_one_store_writes_another_reads(store: MemoryStore, open_store: OpenStore) -> None:
+    other = open_store("b1")
+    assert names(other) == []
+
+    store.write(place("dock"))
+    assert names(other) == ["dock"]
+
+    other.write(place("hall"))
+    assert names(store) == ["dock", "hall"]
+
+
+def test_what_is_remembered_of_a_place_joins_what_was(store: MemoryStore) -> None:
+    store.remember(place("dock", 1.0, HOSE))
+
+    receipt, merge = store.remember(place("Dock", 1.0, TAP))
+
+    assert [views[0].label for views in merge.kept] == ["hose"]
+    assert receipt.waypoint.landmarks == store.read().waypoints[0].landmarks
+    assert {each.label for each in receipt.waypoint.landmarks} == {"hose", "tap"}
+    assert receipt.previous is not None
+    assert [each.label for each in receipt.previous.landmarks] == ["hose"]
+
+
+def test_what_is_gone_is_remembered_no_more(store: MemoryStore) -> None:
+    store.remember(place("dock", 1.0, HOSE, TAP))
+
+    receipt, _ = store.remember(place("dock"), gone=["hose"])
+
+    assert [each.label for each in receipt.waypoint.present().landmarks] == ["tap"]
+    assert [each.label for each in receipt.waypoint.landmarks if each.is_gone] == ["hose"]
+    again, merge = store.remember(place("dock", 1.0, HOSE))
+    assert [each.label for each in merge.new] == ["hose"]
+    assert not any(each.is_gone for each in again.waypoint.landmarks)
+
+
+def test_what_many_remember_of_one_place_at_once_is_all_there(open_store: OpenStore) -> None:
+    stores = [open_store("b1") for _ in range(4)]
+
+    def remember(number: int) -> None:
+        stores[number % 4].remember(place("dock", 1.0, Landmark(label=f"thing {number}")))
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(remember, range(12)))
+
+    (dock,) = stores[0].read().waypoints
+    assert {each.label for each in dock.landmarks} == {f"thing {number}" for number in range(12)}
+
+
+def test_many_waypoints_are_written_together_or_not_at_all(store: MemoryStore) -> None:
+    store.write(place("dock"))
+
+    store.write_all(lambda before: [place("hall"), replace(before.waypoints[0], description="new")])
+    assert names(store) == ["dock", "hall"]
+    assert store.read().waypoints[0].description == "new"
+
+    def fail(_: object) -> list[Waypoint]:
+        raise SemanticMapError("No.", hint="None.")
+
+    with pytest.raises(SemanticMapError, match="No"):
+        store.write_all(fail)
+    assert names(store) == ["dock", "hall"]
+
+
+# --- forgetting ------------------------------------------------------------------------------
+
+
+def test_a_removed_waypoint_is_forgotten_by_all_and_can_be_written_again(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    other = open_store("b1")
+    for name in ("dock", "hall", "gate"):
+        store.write(place(name, 1.0, HOSE))
+    assert names(other) == ["dock", "hall", "gate"]
+
+    removed = store.remove(" HALL")
+
+    assert removed is not None
+    assert removed.name == "hall"
+    assert names(store) == names(other) == ["dock", "gate"]
+    assert other.write(removed).waypoint == removed
+    assert set(names(store)) == {"dock", "gate", "hall"}
+
+
+def test_all_waypoints_can_be_removed_and_new_ones_written(store: MemoryStore) -> None:
+    for name in ("dock", "hall"):
+        store.write(place(name))
+    for name in ("hall", "dock"):
+        store.remove(name)
+    assert names(store) == []
+
+    store.write(place("gate"))
+    assert names(store) == ["gate"]
+
+
+def test_removing_what_no_one_remembers_changes_nothing(store: MemoryStore) -> None:
+    store.write(place("dock"))
+
+    assert store.remove("hall") is None
+    assert names(store) == ["dock"]
+
+
+# --- events ----------------------------------------------------------------------------------
+
+
+def test_an_event_gets_an_id_and_can_be_changed_by_it(store: MemoryStore) -> None:
+    store.write(place("dock"))
+    noted = store.write_event(Event(text="wet floor", place="C1", effect=Effect.AVOID))
+    store.write_event(Event(text="open day"))
+
+    ended = store.write_event(replace(noted, until=datetime(2026, 11, 2, tzinfo=UTC)))
+
+    assert ended.id == noted.id
+    assert [each.text for each in store.read_events()] == ["wet floor", "open day"]
+    assert store.read_events()[0] == ended
+    assert names(store) == ["dock"]
+
+
+# --- maps ------------------------------------------------------------------------------------
+
+
+def test_a_waypoint_of_another_map_is_not_written(store: MemoryStore) -> None:
+    with pytest.raises(SemanticMapError, match='waypoint "dock" belongs to the map "b2"'):
+        store.write(replace(place("dock"), map_id="b2"))
+
+
+def test_a_store_without_a_map_takes_the_memory_for_what_it_says(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    store.write(place("dock"))
+    anywhere = open_store(None)
+
+    anywhere.write(place("hall"))
+
+    assert anywhere.read().map_id == "b1"
+    assert anywhere.read().warnings == ()
+
+
+# --- frames ----------------------------------------------------------------------------------
+
+
+def with_frame(frames: Frames) -> Frames:
+    return frames.added(MapFrame(id="F2", map_id="house", robot="r1", walls="map-2.yaml"))
+
+
+def test_frames_are_written_and_no_record_changes(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    before = store.write(place("dock", 1.0)).waypoint
+
+    store.write_frames(with_frame)
+    store.write_frames(lambda frames: frames.aligned("F2", None, motion=Pose(3.0, 0.0, 1.0)))
+
+    frame = open_store(None).read().frames.by_id["F2"]
+    assert (frame.map_id, frame.robot, frame.walls) == ("house", "r1", "map-2.yaml")
+    assert frame.pose is not None
+    assert frame.pose.yaw_rad == pytest.approx(1.0, abs=1e-5)
+    assert store.read().waypoints == (before,)
+
+
+def test_a_name_of_a_frame_that_lies_nowhere_is_another_place(store: MemoryStore) -> None:
+    store.write(place("dock", 1.0))
+    store.write_frames(with_frame)
+
+    for _ in range(2):
+        receipt, _ = store.remember(replace(place("dock", 5.0), frame="F2"))
+
+    assert receipt.waypoint.name == "dock (2)"
+    assert names(store) == ["dock", "dock (2)"]
+
+
+def test_a_name_of_an_aligned_frame_is_the_same_place_and_keeps_its_frame(
+    store: MemoryStore,
+) -> None:
+    store.write(place("dock", 1.0))
+    store.write_frames(with_frame)
+    store.write_frames(lambda frames: frames.aligned("F2", None, motion=Pose(3.0, 0.0)))
+
+    receipt, _ = store.remember(replace(place("dock", 5.0), frame="F2"))
+
+    assert receipt.waypoint.frame is None
+    assert receipt.waypoint.pose.x == 8.0
+    assert names(store) == ["dock"]
+
+
+def test_an_event_stays_in_its_frame_when_it_is_changed(store: MemoryStore) -> None:
+    event = store.write_event(Event(text="wet", at=Point(1.0, 0.0)))
+    store.write_frames(with_frame)
+    store.write_frames(lambda frames: frames.aligned("F2", None, motion=Pose(3.0, 0.0)))
+
+    store.write_event(replace(event, at=Point(-2.0, 0.0), source="me", frame="F2"))
+
+    changed = store.read_events()[0]
+    assert (changed.frame, changed.at, changed.source) == (None, Point(1.0, 0.0), "me")
+
+
+# --- walls -----------------------------------------------------------------------------------
+
+SMALL = OccupancyGrid(
+    cells=np.array([[0, 100, -1], [0, 0, 100]], dtype=np.int8),
+    resolution_m=0.05,
+    origin=Pose(-1.0, 2.0, 0.5),
+    stamp_s=3.5,
+)
+
+
+def test_walls_that_are_kept_are_read_by_another(store: MemoryStore, open_store: OpenStore) -> None:
+    assert store.walls.load("map.yaml") is None
+
+    store.walls.keep(SMALL, "map.yaml")
+
+    kept = open_store(None).walls.load("map.yaml")
+    assert kept is not None
+    assert (kept.cells == SMALL.cells).all()
+    assert (kept.resolution_m, kept.origin) == (SMALL.resolution_m, SMALL.origin)
+
+
+def test_walls_take_the_place_of_those_before_unless_they_are_to_be_the_first(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    other = replace(SMALL, cells=np.zeros((4, 4), dtype=np.int8))
+    assert store.walls.keep(SMALL, "map.yaml", is_first=True)
+
+    assert not open_store(None).walls.keep(other, "map.yaml", is_first=True)
+    kept = store.walls.load("map.yaml")
+    assert kept is not None
+    assert kept.cells.shape == (2, 3)
+    assert open_store(None).walls.keep(other, "map.yaml")
+    replaced = store.walls.load("map.yaml")
+    assert replaced is not None
+    assert replaced.cells.shape == (4, 4)
+
+
+def test_a_free_name_is_that_of_no_kept_walls(store: MemoryStore) -> None:
+    first = store.walls.free_name()
+    store.walls.keep(SMALL, first)
+
+    assert store.walls.free_name() != first

@@ -1,0 +1,217 @@
+"""Places as people say them, through the tools: superlatives, several at once, looking back."""
+
+import math
+import re
+from collections.abc import AsyncGenerator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcp.client import Client
+
+from drawing import grid_from_text
+from fakes import FakeRobot
+from guarding import make_guard
+from mapspeak.geometry import Pose
+from mapspeak.spatial import OccupancyGrid
+from served import connect, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+TOOLSETS = ("places", "drive", "routes", "memory", "paper")
+FOUR_ROOMS = """
+#############################################
+#............#..............#...............#
+#............#..............#...............#
+#............#..............#...............#
+#............#..............#...............#
+#............#..............#...............#
+#............#..............#...............#
+######...#########...###########...##########
+#...........................................#
+#...........................................#
+#...........................................#
+#...........................................#
+#############...#############################
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            #.................#
+            ###################
+"""
+
+
+def _four_rooms() -> OccupancyGrid:
+    return grid_from_text(FOUR_ROOMS, resolution_m=0.25)
+
+
+@pytest.fixture(name="client")
+async def _client(tmp_path: Path) -> AsyncGenerator[Client]:
+    robot = FakeRobot(_four_rooms(), pose=Pose(1.5, 4.5))
+    guard = make_guard(tmp_path)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        yield client
+
+
+async def _sizes(client: Client) -> list[str]:
+    """Return the ids of the rooms as the table of sizes has them, smallest first."""
+    text = text_of(await client.call_tool("measure", {}))
+    rows = text.split("## Sizes, smallest first")[1].splitlines()
+    return [row.split(" | ")[0] for row in rows if re.match(r"R\d+ \| room", row)]
+
+
+async def _ways(client: Client, places: list[str]) -> list[str]:
+    text = text_of(await client.call_tool("measure", {"places": places}))
+    rows = text.split("## Sizes")[0].splitlines()
+    return [row.split(" | ")[0] for row in rows if re.match(r"[RCDOTW]\d+ \|", row)]
+
+
+async def _goal(client: Client, place: str) -> dict[str, Any]:
+    return report_of(await client.call_tool("check_goal", {"place": place}))
+
+
+@pytest.mark.parametrize(
+    ("words", "at"),
+    [
+        ("smallest room", 0),
+        ("the second-smallest room", 1),
+        ("third smallest room", 2),
+        ("largest room", -1),
+        ("the biggest room", -1),
+        ("the second largest room", -2),
+    ],
+)
+async def test_a_room_is_meant_by_its_size(client: Client, words: str, at: int) -> None:
+    by_size = await _sizes(client)
+    assert len(by_size) == 4
+    text = text_of(await client.call_tool("measure", {"places": [words]}))
+    assert f"\n{by_size[at]} | " in text
+    assert (await _goal(client, words))["room"] == by_size[at]
+
+
+async def test_the_answer_says_why_it_is_that_room(client: Client) -> None:
+    smallest = (await _sizes(client))[0]
+    text = text_of(await client.call_tool("measure", {"places": ["smallest room"]}))
+    assert re.search(rf"{smallest} is the smallest of 4 rooms, \d+\.\d m2\.", text)
+
+
+async def test_a_rank_that_there_is_not_names_those_there_are(client: Client) -> None:
+    answer = await client.call_tool("check_goal", {"place": "fifth-largest room"})
+    assert answer.is_error
+    assert "fourth-largest room" in text_of(answer)
+
+
+async def test_the_farthest_of_a_kind_is_the_last_of_those_by_way(client: Client) -> None:
+    doors = await _ways(client, ["all doors"])
+    farthest = text_of(await client.call_tool("measure", {"places": ["farthest door"]}))
+    assert f"{doors[-1]} is the farthest door of {len(doors)}" in farthest
+    assert await _ways(client, ["the two nearest doors"]) == doors[:2]
+    assert await _ways(client, ["second-nearest door"]) == doors[1:2]
+
+
+async def test_between_the_two_nearest_doors_is_between_these(client: Client) -> None:
+    first, second, *_ = await _ways(client, ["all doors"])
+    asked = await _goal(client, "between the two nearest doors")
+    meant = await _goal(client, f"between {first} and {second}")
+    assert asked["pose"] == meant["pose"]
+
+
+@pytest.mark.parametrize("words", ["all rooms", "every room", "each of the rooms"])
+async def test_all_rooms_are_measured_at_once(client: Client, words: str) -> None:
+    assert sorted(await _ways(client, [words])) == sorted(await _sizes(client))
+
+
+async def test_where_one_place_is_wanted_several_are_named(client: Client) -> None:
+    answer = await client.call_tool("navigate_to", {"place": "all rooms"})
+    assert answer.is_error
+    assert "means 4 places" in text_of(answer)
+    assert all(room in text_of(answer) for room in await _sizes(client))
+
+
+async def test_a_route_past_all_rooms_goes_to_the_nearest_next(client: Client) -> None:
+    rooms = await _sizes(client)
+    answer = report_of(await client.call_tool("follow_route", {"stops": ["all rooms"]}))
+    told = [*answer["done"], answer["next"], *answer["remaining"]]
+    assert sorted(filter(None, told)) == sorted(rooms)
+    assert len(answer["legs_m"]) == 4
+
+
+async def test_a_room_without_a_way_is_left_out_of_all_rooms_and_told(client: Client) -> None:
+    last = (await _ways(client, ["all rooms"]))[-1]
+    closing = {"text": "painted", "place": last, "effect": "closed"}
+    assert not (await client.call_tool("note_event", closing)).is_error
+    answer = report_of(await client.call_tool("follow_route", {"stops": ["all rooms"]}))
+    assert [each.split(":")[0] for each in answer["skipped"]] == [last]
+    assert "closed by event E1" in answer["skipped"][0]
+
+
+async def test_every_remembered_extinguisher_is_meant_at_once(client: Client) -> None:
+    for name, x in (("west", 2.0), ("east", 9.0)):
+        thing = {"label": "fire extinguisher", "bearing_deg": 90, "range_m": 0.6}
+        place = {"name": name, "description": "", "safety_landmarks": [thing], "x": x, "y": 4.5}
+        assert not (await client.call_tool("write_semantic_data", place)).is_error
+    for words in ("every remembered extinguisher", "all fire extinguishers"):
+        assert sorted(await _ways(client, [words])) == ["T1", "T2"]
+    answer = report_of(
+        await client.call_tool("follow_route", {"stops": ["every extinguisher"], "wait_s": 25})
+    )
+    told = [*answer["done"], answer["next"].split(":")[0], *answer["remaining"]]
+    assert sorted(filter(None, told)) == ["T1", "T2"]
+
+
+async def test_a_name_that_reads_like_all_of_a_kind_is_the_name(client: Client) -> None:
+    place = {"name": "all rooms", "description": "A sign.", "x": 2.0, "y": 4.5}
+    await client.call_tool("write_semantic_data", place)
+    assert (await _goal(client, "all rooms"))["pose"]["x"] == 2.0
+
+
+@pytest.mark.parametrize("words", ["looking back through its door", "facing its door"])
+async def test_a_room_can_be_looked_back_out_of(client: Client, words: str) -> None:
+    room = (await _sizes(client))[0]
+    doors = await _ways(client, [f"all doors of {room}"])
+    goal = await _goal(client, f"{room} {words}")
+    assert (goal["room"], goal["verdict"]) == (room, "ok")
+    facing = await _goal(client, f"{room} facing {doors[0]}")
+    assert goal["pose"]["yaw_deg"] == pytest.approx(facing["pose"]["yaw_deg"], abs=15)
+    assert math.isfinite(goal["path_m"])
+
+
+async def test_of_some_rooms_the_smallest_is_told_as_that_of_these(client: Client) -> None:
+    first, second, *_ = await _sizes(client)
+    one = text_of(await client.call_tool("measure", {"places": [second]}))
+    two = text_of(await client.call_tool("measure", {"places": [first, second]}))
+    assert f"The only room of these: {second} (" in one
+    assert f"The smaller room of these is {first} (" in two
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "the red door",
+        "a quiet room",
+        "somewhere to the left",
+        "the biggest of them",
+        "where the lift is",
+        "every spaceship",
+        "the north side of R2",
+    ],
+)
+async def test_words_that_cannot_be_read_are_answered_with_phrases_that_can(
+    client: Client, words: str
+) -> None:
+    place = {"name": "sink corner", "description": "A corner.", "x": 2.0, "y": 4.5}
+    await client.call_tool("write_semantic_data", place)
+    answer = await client.call_tool("check_goal", {"place": words})
+    assert answer.is_error
+    told = re.search(r"Such words can be read: (.+?)\.(?: |$)", text_of(answer))
+    assert told is not None, text_of(answer)
+    phrases = re.findall(r"'([^']+)'", told[1])
+    assert 2 <= len(phrases) <= 3
+    for phrase in phrases:
+        assert not (await client.call_tool("measure", {"places": [phrase]})).is_error, phrase
