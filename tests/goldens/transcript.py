@@ -25,6 +25,8 @@ from served import pictures_of, text_of
 
 IDS = re.compile(r"\b[RCODFWTE]\d+\b")
 SECONDS = re.compile(r"\b\d+(?:\.\d+)?(?= s\b)")
+DIGEST = re.compile(r"(?<=\bo)[0-9a-f]{12}\b|(?<=Z-)[0-9a-f]{12}(?=\.jpg)")
+"""Of an observation or a camera's picture: from all digits of a pose, which the processor sways."""
 EVERYTHING = ("look", "places", "drive", "explore", "routes", "paper", "memory")
 
 
@@ -57,8 +59,10 @@ class Transcript:
 
     @property
     def text(self) -> str:
-        """All of it, one call after the other."""
-        return "\n\n".join(self.entries) + "\n"
+        """All of it, one call after the other; digests are numbered."""
+        text = "\n\n".join(self.entries) + "\n"
+        digests = list(dict.fromkeys(DIGEST.findall(text)))
+        return DIGEST.sub(lambda found: f"{digests.index(found[0]) + 1}", text)
 
 
 @asynccontextmanager
@@ -111,8 +115,11 @@ def _structure(result: CallToolResult) -> list[str]:
 
 def _digest(picture: ImageContent) -> str:
     image = Image.open(io.BytesIO(base64.b64decode(picture.data)))
-    digest = hashlib.sha256(image.convert("RGB").tobytes()).hexdigest()[:16]
-    return f"picture {picture.mime_type} {image.width}x{image.height} {digest}"
+    size = f"picture {picture.mime_type} {image.width}x{image.height}"
+    if picture.mime_type == "image/jpeg":
+        # A camera's: the last digits of its pose, and so of its pixels, depend on the processor.
+        return size
+    return f"{size} {hashlib.sha256(image.convert('RGB').tobytes()).hexdigest()[:16]}"
 
 
 def _compact(value: object) -> str:

@@ -86,9 +86,7 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
     united = {j: _noted(_united(looks[j], old[i]), now) for j, i in partner.items()}
     missed = [i for i in range(len(old)) if i not in partner.values()]
     lasting = [i for i in missed if name_key(old[i][0].label) not in gone_keys]
-    # A record that is joined again is the same look: it misses nothing twice.
-    is_new_look = now.recorded_at is None or now.recorded_at != before.recorded_at
-    kept = {i: _noted(_counted(old[i], now) if is_new_look else old[i], now) for i in lasting}
+    kept = {i: _noted(_counted(old[i], before, now), now) for i in lasting}
     after = [united.get(j, (thing,)) for j, thing in enumerate(now.landmarks)]
     n_now, n_before = len(now.safety_landmarks), len(of_safety)
     safety = (*after[:n_now], *(views for i, views in kept.items() if i < n_before))
@@ -212,8 +210,12 @@ def _is_of_earlier(landmark: Landmark) -> bool:
     return landmark.stamp_s is not None or landmark.recorded_at is not None
 
 
-def _counted(views: Views, now: Waypoint) -> Views:
+def _counted(views: Views, before: Waypoint, now: Waypoint) -> Views:
     """Return views of a thing that a look does not name: missed once more where it should."""
+    told = (now.recorded_at, now.stamp_s)
+    if now.recorded_at is not None and told == (before.recorded_at, before.stamp_s):
+        # A record that is joined again is the same look: it misses nothing twice.
+        return views
     latest, *others = views
     here = seen_from(latest, latest.pose or now.pose, now.pose)
     cone = find_cone(now)
