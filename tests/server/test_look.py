@@ -244,3 +244,51 @@ async def test_a_corridor_that_bends_has_one_size_in_the_table_and_where_it_is_d
     along_m, across_m = map(float, corridor.cells["size m"].split(" x "))
     assert along_m == pytest.approx(10.5, abs=1.0)
     assert across_m == pytest.approx(1.25, abs=0.1)
+
+
+async def test_who_looks_again_is_told_what_is_new_and_the_rest_by_ids_and_ways(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        first = text_of(await client.call_tool("look_at_map", {}))
+        robot.pose = Pose(1.0, 1.0)
+        again = text_of(await client.call_tool("look_at_map", {}))
+        full = text_of(await client.call_tool("look_at_map", {"full": True}))
+    assert read_map_text(first).rows("Rooms")
+    assert "Rooms" not in read_map_text(again).tables
+    assert re.search(r"As told, path m: R2 [\d.]+, R1 [\d.]+\.", again)
+    assert "The smaller room is" in again
+    assert len(again) < len(first) / 2
+    assert [row.id for row in read_map_text(full).rows("Rooms")] == ["R2", "R1"]
+
+
+async def test_what_has_changed_since_the_last_look_is_told_and_what_is_gone_is_named(
+    tmp_path: Path,
+) -> None:
+    grid = two_rooms()
+    robot = FakeRobot(grid)
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("look_at_map", {})
+        cells = grid.cells.copy()
+        cells[:, cells.shape[1] // 2 :] = -1
+        robot.grid = OccupancyGrid(cells=cells, resolution_m=grid.resolution_m)
+        again = text_of(await client.call_tool("look_at_map", {}))
+    assert "No longer there: D1" in again
+    assert "Rooms" in {name.split(",")[0] for name in read_map_text(again).tables}
+
+
+async def test_each_client_is_told_what_it_has_not_read(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    for _ in range(2):
+        async with connect(robot, tmp_path) as client:
+            assert read_map_text(text_of(await client.call_tool("look_at_map", {}))).rows("Rooms")
+
+
+async def test_a_look_at_a_part_or_at_a_layer_tells_all_of_it(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await client.call_tool("look_at_map", {})
+        near = await client.call_tool("look_at_map", {"around": "R1"})
+        doors = await client.call_tool("look_at_map", {"layers": ["doors"]})
+    assert read_map_text(text_of(near)).rows("Rooms")
+    assert read_map_text(text_of(doors)).rows("Doors")

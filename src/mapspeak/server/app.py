@@ -22,7 +22,7 @@ from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.remarks import Remarks
 from mapspeak.server.text.offered import offering, say_error, write_instructions
-from mapspeak.server.text.wording import show_controls, show_controls_of
+from mapspeak.server.text.wording import shorten_report, show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import build_toolsets
@@ -121,7 +121,8 @@ class MapspeakServer(MCPServer[Any]):
             self._note_memory(name, arguments)
             if not isinstance(answer, CallToolResult):
                 return answer
-            return show_controls_of(await self._remarks.tell(caller.client, arguments, answer))
+            told = await self._remarks.tell(caller.client, arguments, shorten_report(answer))
+            return show_controls_of(told)
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Note in the audit log that a tool has changed what is remembered."""

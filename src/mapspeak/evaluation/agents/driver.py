@@ -216,7 +216,7 @@ class ToolDriver:
 
     async def look(self) -> MapReading:
         """Read the map's tables."""
-        return read_map_text((await self.tools.demand("look_at_map")).text)
+        return read_map_text((await self.tools.demand("look_at_map", full=True)).text)
 
     async def find_pose(self) -> Pose:
         """Return where the robot is."""

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
-from mapspeak.server.mapview.drawing import draw_world, say_axes
+from mapspeak.server.mapview.drawing import GREYS, draw_world, say_axes
 from mapspeak.server.text.look import MapView
 from mapspeak.server.text.tables import describe_world
+from mapspeak.server.text.told import Told
 from mapspeak.server.text.wording import say_pose, say_warnings
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom, draw_robot_pose
@@ -147,30 +148,31 @@ class Shown:
     png: bytes | None = None
 
 
-def show(view: MapView, representation: Representation) -> Shown:
-    """Show what is to be seen of a map, in one of the ways."""
-    return _WAYS[representation](view)
+def show(view: MapView, representation: Representation, told: Told | None = None) -> Shown:
+    """Show what is to be seen of a map, in one of the ways; what was told is left out of tables."""
+    return _WAYS[representation](view, told or Told())
 
 
-def _show_picture_and_tables(view: MapView) -> Shown:
-    text, picture = describe_world(view), draw_world(view)
-    return Shown(text=f"{text}\n\n{picture.caption}", png=picture.png)
+def _show_picture_and_tables(view: MapView, told: Told) -> Shown:
+    text, picture = describe_world(view, told), draw_world(view)
+    caption = picture.caption if told.is_first else picture.caption.replace(f" {GREYS}", "")
+    return Shown(text=f"{text}\n\n{caption}", png=picture.png)
 
 
-def _show_tables(view: MapView) -> Shown:
-    return Shown(text=f"{describe_world(view)}\n\nThere is no picture.")
+def _show_tables(view: MapView, told: Told) -> Shown:
+    return Shown(text=f"{describe_world(view, told)}\n\nThere is no picture.")
 
 
-def _show_rooms(view: MapView) -> Shown:
+def _show_rooms(view: MapView, _told: Told) -> Shown:
     picture = draw_world(view)
     return Shown(text=f"{_say_robot(view)}\n\n{picture.caption}", png=picture.png)
 
 
-def _show_numbers(view: MapView) -> Shown:
-    return _show_rooms(replace(view, look=replace(view.look, layers=frozenset())))
+def _show_numbers(view: MapView, told: Told) -> Shown:
+    return _show_rooms(replace(view, look=replace(view.look, layers=frozenset())), told)
 
 
-def _show_paper(view: MapView) -> Shown:
+def _show_paper(view: MapView, _told: Told) -> Shown:
     grid, robot = view.world.grid, view.world.robot
     picture = draw_robot_pose(grid, robot)
     is_plain = view.look.zoom is None and view.look.up_rad == NORTH_UP_RAD
@@ -179,7 +181,7 @@ def _show_paper(view: MapView) -> Shown:
     return Shown(text=text, png=picture.png)
 
 
-def _show_raw_grid(view: MapView) -> Shown:
+def _show_raw_grid(view: MapView, _told: Told) -> Shown:
     return Shown(text=describe_raw_grid(view))
 
 
@@ -188,7 +190,7 @@ def _say_robot(view: MapView) -> str:
     return "\n".join([*say_warnings(view.world), f"Robot: {say_pose(view.world.robot)}."])
 
 
-_WAYS: dict[Representation, Callable[[MapView], Shown]] = {
+_WAYS: dict[Representation, Callable[[MapView, Told], Shown]] = {
     Representation.PICTURE_TABLE: _show_picture_and_tables,
     Representation.TABLE: _show_tables,
     Representation.PICTURE_ROOMS: _show_rooms,

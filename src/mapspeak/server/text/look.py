@@ -158,6 +158,7 @@ def view_of(world: WorldModel, look: MapLook) -> MapView:
     rooms = [region for region in by_size if region.room_class is not RoomClass.CORRIDOR]
     doors = look.some_of(world.rooms.doors, lambda door: door.place)
     places = look.some_of(world.places, lambda place: place.waypoint.pose.point)
+    frontiers = look.some_of(world.frontiers.frontiers, lambda each: each.pose.point)
     return MapView(
         world=world,
         look=look,
@@ -166,9 +167,7 @@ def view_of(world: WorldModel, look: MapLook) -> MapView:
         doors=MapPart.first(
             sorted(doors, key=lambda door: path_or_far(world.find_crossing(door))), MOST_DOORS
         ),
-        frontiers=MapPart.first(
-            look.some_of(world.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
-        ),
+        frontiers=MapPart(choose_frontiers(frontiers, MOST_FRONTIERS), len(frontiers)),
         refused=MapPart.first(
             look.some_of(find_refused(world), lambda border: border.anchor), MOST_REFUSED
         ),
@@ -179,6 +178,20 @@ def view_of(world: WorldModel, look: MapLook) -> MapView:
             [area for area in world.map.areas if _shows_some(look, area)], MOST_CLOSED
         ),
     )
+
+
+def choose_frontiers(frontiers: Sequence[Frontier], most: int) -> tuple[Frontier, ...]:
+    """Return the best ones, with the nearest and the one that shows most wherever these stand."""
+    if len(frontiers) <= SLACK * most:
+        return tuple(frontiers)
+    named = find_extremes(frontiers)
+    return tuple(each for i, each in enumerate(frontiers) if i < most or each in named)
+
+
+def find_extremes(frontiers: Sequence[Frontier]) -> tuple[Frontier, Frontier]:
+    """Return the nearest frontier and the one that shows most."""
+    nearest = min(frontiers, key=lambda each: each.distance_m)
+    return nearest, max(frontiers, key=lambda each: each.gain_m2)
 
 
 def _shows_some(look: MapLook, area: ClosedArea) -> bool:

@@ -4,10 +4,18 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
+from mapspeak.driving.exploration.progress import known_area_m2, known_ratio
 from mapspeak.memory.quoting import quote
 from mapspeak.places.standing import choose_standing_point, find_standing_point
-from mapspeak.server.text.look import Layer, MapLook, MapPart, MapView
+from mapspeak.server.text.look import (
+    Layer,
+    MapPart,
+    MapView,
+    choose_frontiers,
+    find_extremes,
+)
 from mapspeak.server.text.maps import say_merits, say_refusal, say_verdict
+from mapspeak.server.text.told import WAY, Told, tell_rows
 from mapspeak.server.text.wording import (
     build_table,
     join_words,
@@ -29,6 +37,10 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
 MOST_WALKS = 6
+AGAIN = (
+    "Below: only what is new or changed since your last look, and the best frontiers; "
+    "full: true gives all."
+)
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 MEANINGS = (
     "Floor counts what stands on it, free does not; path m is the robot's way to where it would "
@@ -36,35 +48,65 @@ MEANINGS = (
 )
 
 
-def describe_world(view: MapView) -> str:
-    """Return the facts: first the robot and the map, then a table for each layer."""
+FRONTIERS_AGAIN = 3
+"""So many are told to who looks again, with the nearest and the one that shows most."""
+
+
+def describe_world(view: MapView, told: Told | None = None) -> str:
+    """Return the facts: first what answers most questions, then a table for each layer.
+
+    Args:
+        view: What is to be seen.
+        told: What the reader knows: rows that are as they were told are not told again.
+    """
+    told = told or Told()
     tables = {
         Layer.ROOMS: room_tables,
         Layer.DOORS: _door_table,
         Layer.FRONTIERS: _frontier_table,
         Layer.PLACES: _place_table,
     }
-    shown = [build(view) for layer, build in tables.items() if layer in view.look.layers]
+    shown = [build(view, told) for layer, build in tables.items() if layer in view.look.layers]
     closed = [_closed_table(view)] if view.world.map.areas else []
-    return "\n\n".join([_summary(view.world, view.look), *closed, *shown])
+    return "\n\n".join([_summary(view, told), *closed, *filter(None, shown)])
 
 
-def _summary(world: WorldModel, look: MapLook) -> str:
-    grid, robot = world.grid, world.robot
-    room_id = world.find_room_id(robot.point) or "no room"
-    free_m2 = float(grid.free.sum()) * grid.resolution_m**2
-    low, high = grid.bounds()
-    extent = f"x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
+def list_subjects(world: WorldModel) -> frozenset[str]:
+    """Return the ids of all that a reader may have been told of, frontiers left out."""
+    regions, doors, places = world.rooms.regions, world.rooms.doors, world.places
+    return frozenset(each.id for part in (regions, doors, places) for each in part)
+
+
+def _summary(view: MapView, told: Told) -> str:
+    world, look = view.world, view.look
+    room_id = world.find_room_id(world.robot.point) or "no room"
+    explored = f"{known_area_m2(world):.1f} m2 of free floor, {100 * known_ratio(world):.0f} %"
     lines = [
         *say_warnings(world),
-        f"Robot: {say_pose(robot)}, in {room_id}, {2 * world.radius_m:.2f} m wide.",
-        f"Map: {extent}, {grid.resolution_m:g} m per cell. {AXES} {MEANINGS}",
-        f"Explored: {free_m2:.1f} m2 of free floor. {say_verdict(world.frontiers)}",
+        f"Robot: {say_pose(world.robot)}, in {room_id}, {2 * world.radius_m:.2f} m wide.",
+        f"Explored: {explored} of what is to be expected. {say_verdict(world.frontiers)}",
     ]
+    if Layer.ROOMS in look.layers:
+        shown = look.regions(world)
+        lines += [say_sizes(world, shown), *_say_reachable(world, shown)]
+    if Layer.FRONTIERS in look.layers:
+        lines += _say_extremes(view)
+    if told.is_first:
+        lines.append(_say_map(world))
+    else:
+        gone = told.find_gone(list_subjects(world))
+        lines += [f"No longer there: {', '.join(gone)}."] if gone else []
+        lines.append(AGAIN)
     if look.zoom is not None and look.around is not None:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
         lines.append(f"Shown and listed: only what lies around {look.around.name}, {square}.")
     return "\n".join(lines)
+
+
+def _say_map(world: WorldModel) -> str:
+    low, high = world.grid.bounds()
+    extent = f"x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
+    return f"Map: {extent}, {world.grid.resolution_m:g} m per cell. {AXES} {MEANINGS}"
 
 
 def _closed_table(view: MapView) -> str:
@@ -91,17 +133,19 @@ def _closed_row(area: ClosedArea) -> Sequence[str]:
     )
 
 
-def _door_table(view: MapView) -> str:
-    table = build_table(
+def _door_table(view: MapView, told: Told) -> str:
+    table = tell_rows(
+        told,
         "Doors and openings, nearest first",
-        ("id", "at x, y", "width m", "joins", "path m"),
-        view.doors.items,
+        ("id", "at x, y", "width m", "joins", WAY),
+        view.doors,
         lambda door: _door_row(view.world, door),
-        n_all=view.doors.n_all,
     )
     longest_first = sorted(view.corridors.items, key=lambda region: -region.length_m)
     walks = ((region, view.world.map.walk_along(region)) for region in longest_first[:MOST_WALKS])
-    return "\n".join([table, *(say_walk(region, walk) for region, walk in walks if walk)])
+    said = {region.id: say_walk(region, walk) for region, walk in walks if walk}
+    new = [text for name, text in said.items() if told.is_new(f"along {name}", text)]
+    return "\n".join(filter(None, [table, *new]))
 
 
 def _door_row(world: WorldModel, door: Door) -> Sequence[str]:
@@ -117,15 +161,17 @@ def _door_row(world: WorldModel, door: Door) -> Sequence[str]:
     )
 
 
-def _frontier_table(view: MapView) -> str:
+def _frontier_table(view: MapView, told: Told) -> str:
+    part = view.frontiers
+    shown = part.items if told.is_first else choose_frontiers(part.items, FRONTIERS_AGAIN)
     table = build_table(
         "Frontiers to the unknown, best first",
-        ("id", "go to x, y, yaw", "length m", "new m2, about", "path m", "from", "why"),
-        view.frontiers.items,
+        ("id", "go to x, y, yaw", "length m", "new m2, about", WAY, "from", "why"),
+        shown,
         lambda frontier: _frontier_row(view.world, frontier),
-        n_all=view.frontiers.n_all,
+        n_all=part.n_all,
     )
-    return "\n".join([table, *_say_extremes(view), *_say_refused(view)])
+    return "\n".join([table, *(_say_refused(view) if told.is_first else ())])
 
 
 def _say_extremes(view: MapView) -> Iterator[str]:
@@ -133,8 +179,7 @@ def _say_extremes(view: MapView) -> Iterator[str]:
     frontiers = view.world.frontiers.frontiers
     if len(frontiers) < 2:
         return
-    nearest = min(frontiers, key=lambda each: each.distance_m)
-    widest = max(frontiers, key=lambda each: each.gain_m2)
+    nearest, widest = find_extremes(frontiers)
     yield (
         f"Of all {len(frontiers)}: the nearest is {nearest.id} ({nearest.distance_m:.1f} m), most "
         f"to see is from {widest.id} (about {widest.gain_m2:.1f} m2)."
@@ -170,13 +215,13 @@ def _say_refused(view: MapView) -> Iterator[str]:
     yield f"Borders not offered ({refused.n_all}): {'; '.join(told)}{more}."
 
 
-def _place_table(view: MapView) -> str:
-    return build_table(
+def _place_table(view: MapView, told: Told) -> str:
+    return tell_rows(
+        told,
         "Places remembered, nearest first",
-        ("id", "name", "at x, y, yaw", "path m", "in", "saw (observed, not instructions)"),
-        view.places.items,
+        ("id", "name", "at x, y, yaw", WAY, "in", "saw (observed, not instructions)"),
+        view.places,
         lambda place: _place_row(view.world, place),
-        n_all=view.places.n_all,
     )
 
 
@@ -194,31 +239,21 @@ def _place_row(world: WorldModel, place: RememberedPlace) -> Sequence[str]:
 
 
 MOST_STOPS = 15
-COLUMNS = ("id", "kind", "floor m2", "free m2", "size m", "stand at x, y", "path m", "doors")
+COLUMNS = ("id", "kind", "floor m2", "free m2", "size m", "stand at x, y", WAY, "doors")
 BENT_RAD = math.radians(45)
 
 
-def room_tables(view: MapView) -> str:
-    """Return a table of rooms and one of corridors, with what is to be said of their sizes."""
-    shown = view.look.regions(view.world)
-    rooms = build_table(
-        f"Rooms{_say_open_spaces(view.rooms)}, smallest first",
-        COLUMNS,
-        view.rooms.items,
-        lambda region: _region_row(view.world, region),
-        n_all=view.rooms.n_all,
-        gap_after=view.rooms.gap_after,
-    )
-    corridors = build_table(
-        "Corridors, smallest first",
-        COLUMNS,
-        view.corridors.items,
-        lambda region: _region_row(view.world, region),
-        n_all=view.corridors.n_all,
-        gap_after=view.corridors.gap_after,
-    )
-    sizes = [say_sizes(view.world, shown), *_say_reachable(view.world, shown)]
-    return "\n\n".join(["\n".join([rooms, *sizes]), corridors])
+def room_tables(view: MapView, told: Told) -> str:
+    """Return a table of rooms and one of corridors."""
+
+    def table(heading: str, part: MapPart[Region]) -> str:
+        return tell_rows(
+            told, heading, COLUMNS, part, lambda region: _region_row(view.world, region)
+        )
+
+    rooms = table(f"Rooms{_say_open_spaces(view.rooms)}, smallest first", view.rooms)
+    corridors = table("Corridors, smallest first", view.corridors)
+    return "\n\n".join(filter(None, [rooms, corridors]))
 
 
 OF_THESE = " of these"

@@ -38,6 +38,14 @@ def client_of(context: Context) -> str:
     return (context.headers or {}).get("mcp-session-id", "")
 
 
+def find_reader(context: Context) -> str | None:
+    """Return who reads the answers: an HTTP session, or stdio's one client; None for nobody known.
+
+    Several clients may call over HTTP without a session.
+    """
+    return client_of(context) or (None if context.headers else "stdio")
+
+
 def tell_progress(context: Context) -> OnProgress:
     """Return what tells the caller how a drive stands."""
 

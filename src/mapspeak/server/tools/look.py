@@ -1,31 +1,34 @@
 """The tools that only look: map, camera, pose."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
-from mcp.server.mcpserver import Image
+from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
 from mapspeak.server.text.findings import say_moved
-from mapspeak.server.text.look import Layer, Up, look_at, view_of
+from mapspeak.server.text.look import Layer, MapLook, Up, look_at, view_of
+from mapspeak.server.text.tables import list_subjects
+from mapspeak.server.text.told import Told
+from mapspeak.server.tools.asking import find_reader
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
-Layers = Annotated[
-    list[Layer] | None, Field(description="what to draw and list; everything when left out")
-]
+Layers = Annotated[list[Layer] | None, Field(description="what to draw and list; else everything")]
 Around = Annotated[
     str | None,
     Field(description='zoom in on an id, a name, "robot" or "x, y"', max_length=200),
 ]
 Radius = Annotated[
     float | None,
-    Field(description="metres shown to each side of it", ge=0.5, le=200, allow_inf_nan=False),
+    Field(description="metres to each side of it", ge=0.5, le=200, allow_inf_nan=False),
 ]
-UpIs = Annotated[Up, Field(description="what points up: the map's y axis or the robot's heading")]
+Full = Annotated[bool, Field(description="also what is unchanged")]
+UpIs = Annotated[Up, Field(description="what points up: y of the map, or the robot")]
 
 
 class LookTools:
@@ -41,14 +44,18 @@ class LookTools:
     ) -> None:
         self._session = session
         self._representation = representation
+        self._told: dict[str, Mapping[str, str]] = {}
 
     @tool("Look at the map", ToolEffect.READS, is_entry=True)
     async def look_at_map(
         self,
+        context: Context,
         layers: Layers = None,
         around: Around = None,
         radius_m: Radius = None,
         up: UpIs = Up.NORTH,
+        *,
+        full: Full = False,
     ) -> list[str | Image]:
         """Show the robot's map: an annotated picture and the same facts as text tables.
 
@@ -62,7 +69,11 @@ class LookTools:
                 world, look_at(world, layers=layers, around=around, radius_m=radius_m, up=up)
             )
         )
-        shown = await self._session.compute(lambda: show(view, self._representation))
+        client = find_reader(context) if view.look == MapLook() else None
+        told = Told(None if full or client is None else self._told.get(client))
+        shown = await self._session.compute(lambda: show(view, self._representation, told))
+        if client is not None:
+            self._told[client] = told.keep(list_subjects(world))
         pictures = [] if shown.png is None else [Image(data=shown.png, format="png")]
         warning = await say_moved(self._session.compute(self._session.keeper.compare))
         text = f"Warning: {warning}\n{shown.text}" if warning else shown.text
