@@ -35,7 +35,7 @@ from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, TrueFloor, World, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.worldmodel.model import WorldModel
 

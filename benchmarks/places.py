@@ -25,7 +25,8 @@ from mapspeak.memory import Waypoint
 from mapspeak.memory.store.editing import record_text
 from mapspeak.memory.store.schema import record_data
 from mapspeak.simulator import load_world
-from mapspeak.spatial.mapfiles import MapMode, write_map
+from mapspeak.spatial.mapfiles import MapMode
+from mapspeak.spatial.mapwriting import write_map
 
 __all__ = ["measure"]
 

@@ -22,7 +22,7 @@ from mapspeak.evaluation.trials import (
     write_result,
 )
 from mapspeak.geometry import Pose
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 
 ROOM = """
     ########

@@ -16,7 +16,8 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.geometry import Point
 from mapspeak.simulator import StateRecord, World, load_world
-from mapspeak.spatial.mapfiles import MapMode, write_map
+from mapspeak.spatial.mapfiles import MapMode
+from mapspeak.spatial.mapwriting import write_map
 
 FLAT = """
 title: A flat with a hall, two rooms and a corridor beyond the small one.

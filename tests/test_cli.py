@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from drawing import grid_from_text
 from mapspeak.cli import cli, main
 from mapspeak.cli.episodes import usual_memory
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 
 ROOM = """
 #########

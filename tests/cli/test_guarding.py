@@ -10,7 +10,7 @@ from mapspeak.cli.options import GuardChoice, build_guard
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.safety import Policy
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 
 
 def test_a_server_does_not_start_with_a_mistake_in_its_policy_and_names_the_line(

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,7 @@ from drawing import grid_from_text
 from mapspeak.cli import main
 from mapspeak.geometry import Pose
 from mapspeak.spatial.areagraph.files import from_json, to_geojson, to_osm
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 
 TWO_ROOMS = """
 ##############
@@ -346,6 +347,46 @@ def test_what_was_written_is_told(
     put_map(folder / "hall.yaml")
     assert run_map(monkeypatch, "hall.yaml", "--out", "pictures", "--json", "facts.json") == 0
     assert "Written: pictures, facts.json\n" in capsys.readouterr().out
+
+
+def test_sizes_doors_and_ways_are_told_without_a_robot(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put_map(folder / "hall.yaml")
+    assert run_map(monkeypatch, "hall.yaml", "--from", "0", "0") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith("  The smaller room is R")
+    assert [line.split()[0] for line in lines[2:]] == ["R2", "R1", "D1"]
+    assert all(re.search(r"  way \d+\.\d m$", line) for line in lines[2:4])
+    assert re.search(r"D1 +door +\d\.\d\d m +at 2\.\d+, -?0\.\d+  joins R1 and R2$", lines[4])
+
+
+def test_a_picture_beside_the_yaml_is_read_where_the_path_is_dead(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    yaml = put_map(folder / "maps" / "map.yaml")
+    yaml.write_text(yaml.read_text().replace("map.pgm", r"C:\robot\maps\map.pgm"))
+    assert run_map(monkeypatch, "maps", "--json", "facts.json") == 0
+    assert "map.pgm beside it was read" in capsys.readouterr().out
+    (folder / "maps" / "map.pgm").rename(folder / "maps" / "other.pgm")
+    assert run_map(monkeypatch, "maps/map.yaml") == 1
+    assert "is missing" in capsys.readouterr().err
+
+
+def test_grey_is_unknown_where_somebody_says_so(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    yaml = put_map(folder / "map.yaml")
+    yaml.write_text(yaml.read_text().replace("free_thresh: 0.196", "free_thresh: 0.25"))
+    pixels = np.array(Image.open(folder / "map.pgm"))
+    pixels[1:7, 1:7] = 205
+    Image.fromarray(pixels).save(folder / "map.pgm")
+    assert run_map(monkeypatch, "map.yaml") == 0
+    assert "load as free" in capsys.readouterr().out
+    assert run_map(monkeypatch, "map.yaml", "--grey-unknown") == 0
+    said = capsys.readouterr().out
+    assert "load as free" not in said
+    assert "The only room: R1" in said
 
 
 def test_a_map_is_shown_without_loading_memory_or_driving() -> None:

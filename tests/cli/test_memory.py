@@ -12,7 +12,7 @@ from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.memory.episodes.observation import EpisodeQuery, Observation, ObservationKind
 from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 
 NINE = datetime(2026, 11, 20, 9, 0, tzinfo=UTC)
 HALL = """

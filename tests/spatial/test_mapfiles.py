@@ -15,7 +15,8 @@ from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import MapError
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.mapfiles import MapMode, MapOddity, load_map, load_picture, write_map
+from mapspeak.spatial.mapfiles import MapMode, MapOddity, load_map, load_picture
+from mapspeak.spatial.mapwriting import write_map
 
 USUAL = {
     "image": "map.pgm",

@@ -13,7 +13,9 @@ from typing import NoReturn
 from PIL import Image, UnidentifiedImageError
 
 from mapspeak.errors import ConfigError, say_cause
+from mapspeak.geometry import Point
 from mapspeak.spatial.areagraph import MapAnchor
+from mapspeak.spatial.mapfiles import find_picture
 
 DESCRIPTION_SUFFIXES = {".yaml", ".yml"}
 PICTURE_SUFFIXES = {".png", ".pgm", ".bmp", ".jpg", ".jpeg"}
@@ -160,7 +162,7 @@ def find_image(description: Path) -> Path | None:
         return description
     line = _IMAGE_LINE.search(text)
     # Files of other programs name an image, too, but no resolution.
-    return description.parent / line[1].strip() if line and "resolution" in text else None
+    return find_picture(description, line[1].strip()) if line and "resolution" in text else None
 
 
 def _names(files: list[Path], base: str) -> dict[Path, str]:
@@ -207,6 +209,8 @@ class MapJob:
         resolution_m: The side of a pixel, for a bare picture.
         anchor: Where on Earth the map lies, if anybody said so.
         outputs: The files to write.
+        start: Where ways are measured from, if they are to be told.
+        is_grey_unknown: Takes the grey of unknown for that, whatever the .yaml says.
     """
 
     file: Path
@@ -214,6 +218,8 @@ class MapJob:
     resolution_m: float | None
     anchor: MapAnchor | None
     outputs: Mapping[Output, Path]
+    start: Point | None = None
+    is_grey_unknown: bool = False
 
 
 def plan_jobs(

@@ -4,6 +4,7 @@ import io
 import shutil
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -13,11 +14,17 @@ from PIL import Image
 from mapspeak.cli.mapjobs import MapJob, Output, find_maps, is_description, plan_jobs
 from mapspeak.cli.options import ANCHOR_OPTION, FILE, usual_modes
 from mapspeak.errors import ConfigError, MapError
-from mapspeak.server.text.maps import say_map_warning, say_size
+from mapspeak.geometry import Point
+from mapspeak.server.text.maps import (
+    say_doubtful_door,
+    say_map_warning,
+    say_ranks,
+    say_size,
+)
 from mapspeak.spatial.areagraph import MapAnchor, build_area_graph
 from mapspeak.spatial.coverage import measure_known_area
 from mapspeak.spatial.mapfiles import LoadedMap, load_map, load_picture
-from mapspeak.spatial.rooms import Region, RoomMap, find_rooms
+from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap, find_rooms
 
 
 @click.command("map")
@@ -35,16 +42,32 @@ from mapspeak.spatial.rooms import Region, RoomMap, find_rooms
 @click.option("--geojson", type=FILE, help="The area graph as GeoJSON.")
 @click.option("--osm", type=FILE, help="The area graph as osmAG, for JOSM.")
 @ANCHOR_OPTION
+@click.option(
+    "--from",
+    "start",
+    type=(float, float),
+    metavar="X Y",
+    help="Tell the way from here to each region, for a robot 0.4 m wide.",
+)
+@click.option(
+    "--grey-unknown",
+    "is_grey_unknown",
+    is_flag=True,
+    help="Take grey 205 for unknown, whatever free_thresh says.",
+)
 def map_command(
     files: tuple[Path, ...],
     resolution_m: float | None,
     anchor: MapAnchor | None,
+    start: tuple[float, float] | None,
     picture: Path | None,
     facts: Path | None,
     labels: Path | None,
     graph: Path | None,
     geojson: Path | None,
     osm: Path | None,
+    *,
+    is_grey_unknown: bool,
 ) -> None:
     """Show map_server maps, or bare pictures, as a robot's map is shown; no robot is needed.
 
@@ -66,6 +89,8 @@ def map_command(
         anchor=anchor,
         outputs={output: path for output, path in wanted.items() if path is not None},
     )
+    here = None if start is None else Point(*start)
+    jobs = [replace(job, start=here, is_grey_unknown=is_grey_unknown) for job in jobs]
     with usual_modes():
         n_failed = _show_maps(jobs)
     if n_failed and len(jobs) > 1:
@@ -108,12 +133,12 @@ def show_map(job: MapJob) -> str:
         MapError: The map cannot be read, or cannot be written in the form asked for.
         ConfigError: A result cannot be written where it should go.
     """
-    loaded = _load(job.file, job.resolution_m)
+    loaded = _load(job)
     rooms = find_rooms(loaded.grid)
     contents = {output: _content(output, job, loaded, rooms) for output in job.outputs}
     for output, content in contents.items():
         _write(job.outputs[output], content)
-    return _summary(job.name, loaded, rooms)
+    return _summary(job, loaded, rooms)
 
 
 def _content(output: Output, job: MapJob, loaded: LoadedMap, rooms: RoomMap) -> bytes:
@@ -154,13 +179,13 @@ def _label_picture(rooms: RoomMap) -> bytes:
     return content.getvalue()
 
 
-def _load(file: Path, resolution_m: float | None) -> LoadedMap:
+def _load(job: MapJob) -> LoadedMap:
     with warnings.catch_warnings():
         # How large a map may be is said in an error of our own.
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        if is_description(file) or resolution_m is None:
-            return load_map(file)
-        return load_picture(file, resolution_m=resolution_m)
+        if is_description(job.file) or job.resolution_m is None:
+            return load_map(job.file, is_grey_unknown=job.is_grey_unknown)
+        return load_picture(job.file, resolution_m=job.resolution_m)
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -173,25 +198,65 @@ def _write(path: Path, content: bytes) -> None:
         ) from error
 
 
-def _summary(name: str, loaded: LoadedMap, rooms: RoomMap) -> str:
+def _summary(job: MapJob, loaded: LoadedMap, rooms: RoomMap) -> str:
     grid, known = loaded.grid, measure_known_area(loaded.grid)
     cells = f"{grid.n_cols} x {grid.n_rows} cells of {grid.resolution_m:g} m"
     size = f"{grid.width_m:.1f} x {grid.height_m:.1f} m"
     unknown = f"{100 * (1 - known.known_ratio):.0f} % unknown"
     by_size = sorted(rooms.regions, key=lambda region: region.floor_area_m2)
+    ways = _find_ways(job, loaded, by_size)
     return "\n".join(
         [
-            f"{name}: {cells}, {size}, {known.free_area_m2:.1f} m2 free, {unknown}.",
+            f"{job.name}: {cells}, {size}, {known.free_area_m2:.1f} m2 free, {unknown}.",
             *(f"  warning: {say_map_warning(warning)}" for warning in loaded.warnings),
-            *map(_region_line, by_size),
+            *(f"  {line}" for line in _say_sizes(rooms, by_size)),
+            *(_region_line(region, ways.get(region.id, "")) for region in by_size),
+            *map(_door_line, rooms.doors),
         ]
     )
 
 
-def _region_line(region: Region) -> str:
+def _say_sizes(rooms: RoomMap, by_size: list[Region]) -> list[str]:
+    """Say which room is the smallest and the largest, and which are perhaps no rooms."""
+    named = [region for region in by_size if region.room_class is not RoomClass.CORRIDOR]
+    doubtful = {room.id: door for room in named if (door := rooms.find_doubtful_door(room))}
+    sure = [f"{r.id} ({r.floor_area_m2:.1f} m2)" for r in named if r.id not in doubtful]
+    unsure = [
+        f"{room.id} ({room.floor_area_m2:.1f} m2, {say_doubtful_door(room, doubtful[room.id])})"
+        for room in named
+        if room.id in doubtful
+    ]
+    ranks = say_ranks(sure, is_of_all=True, has_unsure=bool(unsure))
+    return [ranks, f"Unsure: {', '.join(unsure)}."] if unsure else [ranks]
+
+
+def _find_ways(job: MapJob, loaded: LoadedMap, regions: list[Region]) -> dict[str, str]:
+    """Return how far it is to each region, in words; nothing where nobody asked."""
+    if job.start is None:
+        return {}
+    from mapspeak.ros.discovery.profile import USUAL_RADIUS_M  # noqa: PLC0415
+    from mapspeak.spatial.paths.distances import distances_from  # noqa: PLC0415
+
+    field = distances_from(loaded.grid, job.start, radius_m=USUAL_RADIUS_M)
+    ways_m = {region.id: field.distance_to(region.widest) for region in regions}
+    return {
+        name: "  no way" if way_m is None else f"  way {way_m:.1f} m"
+        for name, way_m in ways_m.items()
+    }
+
+
+def _region_line(region: Region, way: str) -> str:
     at = region.widest
     return (
         f"  {region.id:4} {region.room_class:10} {region.floor_area_m2:7.1f} m2  "
         f"{region.length_m:.1f} x {region.width_m:.1f} m  at {at.x + 0.0:.2f}, {at.y + 0.0:.2f}  "
-        f"doors {' '.join(region.door_ids) or 'none'}"
+        f"doors {' '.join(region.door_ids) or 'none'}{way}"
+    )
+
+
+def _door_line(door: Door) -> str:
+    at, (one, other) = door.place, door.region_ids
+    return (
+        f"  {door.id:4} door       {door.width_m:7.2f} m   at {at.x + 0.0:.2f}, {at.y + 0.0:.2f}  "
+        f"joins {one} and {other}"
     )

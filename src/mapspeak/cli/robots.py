@@ -341,7 +341,8 @@ def _is_simulated(choice: RobotChoice) -> bool:
 async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["Robot"]:
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.simulator import Simulation, StateLog, load_world  # noqa: PLC0415
-    from mapspeak.spatial.mapfiles import MapMode, load_map, write_map  # noqa: PLC0415
+    from mapspeak.spatial.mapfiles import MapMode, load_map  # noqa: PLC0415
+    from mapspeak.spatial.mapwriting import write_map  # noqa: PLC0415
 
     if choice.robot_file is not None or choice.ca_file is not None:
         raise ConfigError(

@@ -11,7 +11,8 @@ import numpy as np
 
 from mapspeak.errors import MapError, SemanticMapError
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
-from mapspeak.spatial.mapfiles import load_map, write_map
+from mapspeak.spatial.mapfiles import load_map
+from mapspeak.spatial.mapwriting import write_map
 
 OWN_WALLS = "map.yaml"
 """What those of a memory's own frame are called, unless the memory says otherwise."""

@@ -1,4 +1,4 @@
-"""Map files as Nav2's map_server reads them and its map_saver writes them: a .yaml and a picture.
+"""Map files as Nav2's map_server reads them: a .yaml and a picture.
 
 The rules are those of `nav2_map_server` since 2025: single precision, `occupied_thresh` and
 `free_thresh` themselves belong to occupied and free, transparent pixels are unknown. (Releases
@@ -9,16 +9,16 @@ import math
 import os
 import stat
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 
@@ -33,9 +33,8 @@ MAX_CELLS = 80_000_000
 
 _MAX_YAML_BYTES, _MOST_NESTED = 1_000_000, 20
 _FREE, _OCCUPIED = 0, 100
-_UNKNOWN_GREY, _FREE_GREY, _OCCUPIED_GREY = 205, 254, 0
-_DEFAULT_OCCUPIED_THRESH, _DEFAULT_FREE_THRESH = 0.65, 0.196
-_SAVED_FREE_MAX, _SAVED_OCCUPIED_MIN = 25, 65
+UNKNOWN_GREY = 205
+DEFAULT_OCCUPIED_THRESH, DEFAULT_FREE_THRESH = 0.65, 0.196
 _PICTURE_SUFFIXES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg"}
 _PICTURE_FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 _SWITCHES = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
@@ -59,6 +58,7 @@ class MapOddity(StrEnum):
     UNKNOWN_IS_FREE = "unknown_is_free"
     CROSSED_THRESHOLDS = "crossed_thresholds"
     NOTHING_FREE = "nothing_free"
+    PICTURE_BESIDE = "picture_beside"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,11 +67,13 @@ class MapFileWarning:
 
     Attributes:
         n_cells: Cells that have the grey of unknown, and load as free.
+        picture: The file that was read in place of the one that is named and not there.
     """
 
     oddity: MapOddity
-    free_thresh: float
-    occupied_thresh: float
+    free_thresh: float = DEFAULT_FREE_THRESH
+    occupied_thresh: float = DEFAULT_OCCUPIED_THRESH
+    picture: str = ""
     n_cells: int = 0
     share_ratio: float = 0.0
 
@@ -96,21 +98,45 @@ class _Description:
     image: str
     resolution: float
     origin: Pose
-    occupied_thresh: float = _DEFAULT_OCCUPIED_THRESH
-    free_thresh: float = _DEFAULT_FREE_THRESH
+    occupied_thresh: float = DEFAULT_OCCUPIED_THRESH
+    free_thresh: float = DEFAULT_FREE_THRESH
     negate: bool = False
     mode: MapMode = MapMode.TRINARY
 
 
-def load_map(path: Path) -> LoadedMap:
-    """Read a map_server .yaml and the picture it names.
+def load_map(path: Path, *, is_grey_unknown: bool = False) -> LoadedMap:
+    """Read a map_server .yaml and the picture it names, or one beside it where that is not there.
+
+    Args:
+        path: The .yaml.
+        is_grey_unknown: Takes the grey 205 for unknown, whatever threshold the .yaml has for free.
 
     Raises:
         MapError: A file is missing, damaged, too large, or says what cannot be.
     """
     description = _read_description(path)
-    grey, alpha = _read_picture(path.parent / description.image)
-    return _build_map(description, grey, alpha, path)
+    if is_grey_unknown:
+        thresh = min(description.free_thresh, DEFAULT_FREE_THRESH)
+        description = replace(description, free_thresh=thresh)
+    picture = find_picture(path, description.image)
+    loaded = _build_map(description, *_read_picture(picture), path)
+    if picture == path.parent / description.image:
+        return loaded
+    beside = MapFileWarning(oddity=MapOddity.PICTURE_BESIDE, picture=picture.name)
+    return replace(loaded, warnings=(beside, *loaded.warnings))
+
+
+def find_picture(description: Path, image: str) -> Path:
+    """Return the picture that a .yaml names; where there is none, one of that name beside it.
+
+    Maps that were copied from another machine often name a path of that machine.
+    """
+    beside = (
+        description.with_name(PureWindowsPath(image).name or image),
+        *(description.with_suffix(suffix) for suffix in sorted(_PICTURE_SUFFIXES)),
+    )
+    named = description.parent / image
+    return next((each for each in (named, *beside) if each.is_file()), named)
 
 
 def load_picture(path: Path, *, resolution_m: float) -> LoadedMap:
@@ -124,35 +150,6 @@ def load_picture(path: Path, *, resolution_m: float) -> LoadedMap:
     return _build_map(description, grey, alpha, path)
 
 
-def write_map(grid: OccupancyGrid, path: Path, *, mode: MapMode = MapMode.TRINARY) -> Path:
-    """Write a map as map_saver does: the .yaml at the path, the picture beside it.
-
-    Trinary keeps free (up to 25), occupied (from 65) and unknown, the values between become
-    unknown. Scale and raw keep every value; scale needs a .png for its transparent pixels.
-
-    Returns:
-        The path of the picture.
-
-    Raises:
-        MapError: The path does not end in .yaml, or cannot be written.
-    """
-    if path.suffix not in {".yaml", ".yml"}:
-        raise MapError(
-            f"A map is written to a .yaml file, not to {path.name}.",
-            hint=f"Use {path.with_suffix('.yaml').name}; the picture gets the same name.",
-        )
-    picture_path = path.with_suffix(".png" if mode is MapMode.SCALE else ".pgm")
-    try:
-        _save_picture(grid, picture_path, mode)
-        _save_description(grid, path, picture_path.name, mode)
-    except OSError as error:
-        raise MapError(
-            f"The map cannot be written to {path}: {error.strerror or error}.",
-            hint="Choose a folder that exists and may be written to.",
-        ) from error
-    return picture_path
-
-
 def _build_map(description: _Description, grey: Grey, alpha: Grey | None, path: Path) -> LoadedMap:
     """Return the grid of a picture's greys; row 0 is the lowest line of the picture."""
     occupancy_of = _occupancy_of_grey(description)
@@ -162,12 +159,12 @@ def _build_map(description: _Description, grey: Grey, alpha: Grey | None, path: 
     grid = OccupancyGrid(
         cells=cells[::-1], resolution_m=description.resolution, origin=description.origin
     )
-    n_unknown = int(np.count_nonzero(grey == _UNKNOWN_GREY))
+    n_unknown = int(np.count_nonzero(grey == UNKNOWN_GREY))
     mode, is_crossed = description.mode, description.free_thresh >= description.occupied_thresh
     has = {
         MapOddity.UNKNOWN_IS_FREE: mode is MapMode.TRINARY
         and n_unknown > 0
-        and 0 <= occupancy_of[_UNKNOWN_GREY] <= FREE_MAX,
+        and 0 <= occupancy_of[UNKNOWN_GREY] <= FREE_MAX,
         MapOddity.CROSSED_THRESHOLDS: is_crossed and mode is not MapMode.RAW,
         MapOddity.NOTHING_FREE: not grid.free.any(),
     }
@@ -340,49 +337,6 @@ def _channels(picture: Image.Image) -> tuple[Grey, Grey | None]:
         with_alpha = picture.convert("RGBA")
         return np.asarray(with_alpha.convert("L")), np.asarray(with_alpha.getchannel("A"))
     return np.asarray(picture.convert("L")), None
-
-
-def _save_picture(grid: OccupancyGrid, path: Path, mode: MapMode) -> None:
-    from_top = grid.cells[::-1]
-    grey = _grey_of_occupancy(mode)[from_top.astype(np.intp)]
-    if mode is MapMode.SCALE:
-        alpha = np.where(from_top == UNKNOWN, 0, 255).astype(np.uint8)
-        Image.fromarray(np.stack([grey, grey, grey, alpha], axis=2)).save(path)
-    else:
-        header = f"P5\n{grid.n_cols} {grid.n_rows}\n255\n"
-        path.write_bytes(header.encode("ascii") + grey.tobytes())
-
-
-def _grey_of_occupancy(mode: MapMode) -> Grey:
-    """Return the grey of occupancy 0 to 100, and last, at index -1, of unknown."""
-    occupancy = np.arange(101)
-    if mode is MapMode.RAW:
-        greys, unknown = occupancy, 255
-    elif mode is MapMode.SCALE:
-        greys, unknown = (255 * (100 - occupancy) + 50) // 100, 128
-    else:
-        is_free, is_occupied = occupancy <= _SAVED_FREE_MAX, occupancy >= _SAVED_OCCUPIED_MIN
-        between = np.where(is_occupied, _OCCUPIED_GREY, _UNKNOWN_GREY)
-        greys, unknown = np.where(is_free, _FREE_GREY, between), _UNKNOWN_GREY
-    return np.append(greys, unknown).astype(np.uint8)
-
-
-def _save_description(grid: OccupancyGrid, path: Path, image: str, mode: MapMode) -> None:
-    """Write the .yaml; in scale mode with thresholds that leave every value as it is."""
-    origin = CommentedSeq(float(v) for v in (grid.origin.x, grid.origin.y, grid.origin.yaw_rad))
-    origin.fa.set_flow_style()
-    is_scale = mode is MapMode.SCALE
-    document = {
-        "image": image,
-        "mode": mode.value,
-        "resolution": float(grid.resolution_m),
-        "origin": origin,
-        "negate": 0,
-        "occupied_thresh": 1.0 if is_scale else _DEFAULT_OCCUPIED_THRESH,
-        "free_thresh": 0.0 if is_scale else _DEFAULT_FREE_THRESH,
-    }
-    with path.open("w", encoding="utf-8") as file:
-        YAML(pure=True).dump(document, file)
 
 
 def _open_regular(path: Path) -> BinaryIO:

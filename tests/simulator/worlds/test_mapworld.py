@@ -8,7 +8,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import Simulation, TrueFloor, load_world
 from mapspeak.simulator.worlds.mapworld import build_map_world, find_floor
 from mapspeak.simulator.worlds.slices import slice_world
-from mapspeak.spatial.mapfiles import write_map
+from mapspeak.spatial.mapwriting import write_map
 
 ROOM = """
 ##########

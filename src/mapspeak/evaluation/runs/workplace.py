@@ -27,7 +27,8 @@ from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
 from mapspeak.simulator.worlds.worldfiles import write_with_more
-from mapspeak.spatial.mapfiles import MapMode, load_map, write_map
+from mapspeak.spatial.mapfiles import MapMode, load_map
+from mapspeak.spatial.mapwriting import write_map
 
 ANSWER_WITHIN_S = 120.0
 AUDIT, CONTROL = "audit.jsonl", "control"

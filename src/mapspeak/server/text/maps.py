@@ -1,6 +1,7 @@
 """Maps in words: regions, what is odd about a file, and why a frontier is worth a drive."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 from mapspeak.spatial.frontiers import (
     Frontier,
@@ -11,7 +12,7 @@ from mapspeak.spatial.frontiers import (
     RefusedFrontier,
 )
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
-from mapspeak.spatial.rooms import Region, RoomClass
+from mapspeak.spatial.rooms import Door, Region, RoomClass
 
 
 def say_size(region: Region) -> str:
@@ -40,11 +41,46 @@ def say_map_warning(warning: MapFileWarning) -> str:
                 f"{warning.occupied_thresh:g}. The usual values are free_thresh: 0.196 and "
                 "occupied_thresh: 0.65."
             )
+        case MapOddity.PICTURE_BESIDE:
+            return f"The picture that it names is not there; {warning.picture} beside it was read."
         case MapOddity.NOTHING_FREE:
             return (
                 "No cell of the map is free. Check negate and the thresholds: with negate: 0 "
                 "white is free."
             )
+
+
+def say_ranks(names: Sequence[str], *, is_of_all: bool, has_unsure: bool, so_far: str = "") -> str:
+    """Say which of some rooms is the smallest and which the largest.
+
+    Args:
+        names: Of the rooms, smallest first.
+        is_of_all: They are all the rooms there are.
+        has_unsure: There are others that may be parts of rooms.
+        so_far: " so far" where more may come.
+    """
+    among = so_far if is_of_all else " of these"
+    match names:
+        case []:
+            return "No room is sure yet." if has_unsure else "No rooms among them."
+        case [only]:
+            return f"The only {'sure ' if has_unsure else ''}room{among}: {only}."
+        case [smallest, largest]:
+            return f"The smaller room{among} is {smallest}, the larger {largest}."
+        case [smallest, second, *_, largest]:
+            n_rooms = len(names)
+            counted = f"{n_rooms} rooms{so_far}" if is_of_all else f"these {n_rooms} rooms"
+            return (
+                f"Of {counted} the smallest is {smallest}, then {second}; the largest is {largest}."
+            )
+        case _:
+            raise AssertionError(names)
+
+
+def say_doubtful_door(region: Region, door: Door) -> str:
+    """Say what a region may be part of."""
+    one, other = door.region_ids
+    return f"maybe part of {other if one == region.id else one}: {door.id}"
 
 
 MOST_SIGNS = 59

@@ -14,7 +14,13 @@ from mapspeak.server.text.look import (
     choose_frontiers,
     find_extremes,
 )
-from mapspeak.server.text.maps import say_merits, say_refusal, say_verdict
+from mapspeak.server.text.maps import (
+    say_doubtful_door,
+    say_merits,
+    say_ranks,
+    say_refusal,
+    say_verdict,
+)
 from mapspeak.server.text.told import WAY, Told, tell_rows
 from mapspeak.server.text.wording import (
     build_table,
@@ -256,9 +262,6 @@ def room_tables(view: MapView, told: Told) -> str:
     return "\n\n".join(filter(None, [rooms, corridors]))
 
 
-OF_THESE = " of these"
-
-
 def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     """Say which room is the smallest and which the largest, corridors left out.
 
@@ -268,35 +271,16 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     rooms = _rooms_by_size(regions)
     is_of_all = len(rooms) == len(_rooms_by_size(world.rooms.regions))
     so_far = " so far" if world.may_hide_rooms else ""
-    among = so_far if is_of_all else OF_THESE
     unsure = [room for room in rooms if world.rooms.find_doubtful_door(room)]
     sure = [room for room in rooms if room not in unsure]
     names = [_say_size(world, room) for room in sure]
-    lines = [_say_ranks(names, among) if names or not unsure else "No room is sure yet."]
+    lines = [say_ranks(names, is_of_all=is_of_all, has_unsure=bool(unsure), so_far=so_far)]
     for smallest, second in list(pairwise(sure))[:1]:
         if smallest.floor_area_m2 + world.growth_m2.get(smallest.id, 0) > second.floor_area_m2:
             lines.append(f"{smallest.id} may turn out larger than {second.id}.")
     if unsure:
         lines.append(f"Unsure: {', '.join(_say_size(world, room) for room in unsure)}.")
     return " ".join(lines)
-
-
-def _say_ranks(names: Sequence[str], among: str) -> str:
-    match names:
-        case []:
-            return "No rooms among them."
-        case [only]:
-            return f"The only room{among}: {only}."
-        case [smallest, largest]:
-            return f"The smaller room{among} is {smallest}, the larger {largest}."
-        case [smallest, second, *_, largest]:
-            n = len(names)
-            counted = f"these {n} rooms" if among == OF_THESE else f"{n} rooms{among}"
-            return (
-                f"Of {counted} the smallest is {smallest}, then {second}; the largest is {largest}."
-            )
-        case _:
-            raise AssertionError(names)
 
 
 def say_walk(region: Region, walk: CorridorWalk) -> str:
@@ -363,8 +347,7 @@ def _list_doubts(world: WorldModel, region: Region) -> Iterator[str]:
         yield "not all seen"
     door = world.rooms.find_doubtful_door(region)
     if door is not None:
-        one, other = door.region_ids
-        yield f"maybe part of {other if one == region.id else one}: {door.id}"
+        yield say_doubtful_door(region, door)
 
 
 def _say_size(world: WorldModel, room: Region) -> str:
