@@ -138,3 +138,20 @@ async def test_many_places_are_read_page_by_page(tmp_path: Path) -> None:
     ]
     assert [each["name"] for each in rest["waypoints"]] == ["spot 20", "spot 21", "spot 22"]
     assert (rest["warnings"], rest["n_places"]) == ([], 23)
+
+
+async def test_what_is_found_is_told_in_ten_lines_with_what_may_be_meant(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        for number in range(1, 9):
+            landmarks = [{"label": f"charger | {number}", "bearing_deg": 10.0 * number}]
+            await client.call_tool(
+                "write_semantic_data",
+                {"name": f"bay {number}", "description": "", "functional_landmarks": landmarks},
+            )
+        found = await client.call_tool("find_place", {"query": "charger 3"})
+    lines, report = text_of(found).splitlines(), report_of(found)
+    assert lines[0] == report["advice"]
+    rows = [line.split(" | ") for line in lines[3 : 3 + len(report["candidates"])]]
+    assert [row[0] for row in rows] == [each["id"] for each in report["candidates"]]
+    assert {len(row) for row in rows} == {len(lines[2].split(" | "))}
+    assert len(lines) <= 10

@@ -15,7 +15,7 @@ from mapspeak.memory.episodes.observation import (
     Observation,
     ObservationKind,
 )
-from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.quoting import quote, quote_name
 from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
 from mapspeak.places.goalcheck import say_check
@@ -25,7 +25,7 @@ from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_advice, say_evidence
-from mapspeak.server.text.wording import say_count, say_pose
+from mapspeak.server.text.wording import build_table, say_count, say_pose
 
 MOST_READ = 200
 APART_M = 1.0
@@ -153,6 +153,37 @@ class CandidateReport(Report):
             trust_why=say_trust(candidate.trust)[:MOST_DOUBTS],
         )
 
+    @property
+    def row(self) -> tuple[str, ...]:
+        """A line of a table with the columns `COLUMNS`."""
+        at, stand = self.position, self.stand_at
+        radius = "" if self.uncertainty_m is None else f" (within {self.uncertainty_m:.1f} m)"
+        faced = ", facing it" if self.facing_it else ""
+        return (
+            self.id,
+            quote_name(self.name),
+            self.why,
+            "not noted" if at is None else f"{at[0]:.2f}, {at[1]:.2f}{radius}",
+            self.room or "-",
+            self.problem or ("no way" if self.path_m is None else f"{self.path_m:.1f}"),
+            f"{stand.x:.2f}, {stand.y:.2f}, {stand.yaw_deg:.0f} deg{faced}",
+            f"{self.trust:.2f}",
+            (self.last_seen or "-").split(", ")[-1],
+        )
+
+
+COLUMNS = (
+    "id",
+    "name (observed)",
+    "why",
+    "at x, y",
+    "in",
+    "path m",
+    "stand at x, y, yaw",
+    "trust",
+    "last seen",
+)
+
 
 class RecallAnswer(Report):
     """What is remembered of a request."""
@@ -181,6 +212,16 @@ class RecallAnswer(Report):
             understood=answer.understood,
             warnings=[*filter(None, warnings), *limits],
         )
+
+    @property
+    def text(self) -> str:
+        """The answer in lines: what to do, a line for each candidate, what speaks for the first."""
+        heading = f"{self.n_fitting} of {self.n_searched} fit {quote(self.understood)}"
+        lines = [self.advice]
+        for first in self.candidates[:1]:
+            lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))
+            lines += [f"Trust in {first.id}: {' '.join(first.trust_why)}"] * bool(first.trust_why)
+        return "\n".join([*lines, *self.warnings])
 
 
 def _say_moment(moment: datetime | None, now: datetime | None) -> str | None:

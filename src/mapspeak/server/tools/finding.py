@@ -83,7 +83,7 @@ class FindTools:
         if warning:
             report = report.model_copy(update={"warnings": [warning, *report.warnings]})
         return CallToolResult(
-            content=[TextContent(type="text", text=report.model_dump_json())],
+            content=[TextContent(type="text", text=report.text)],
             structured_content=report.model_dump(mode="json"),
         )
 
