@@ -5,6 +5,7 @@ import pytest
 
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
+from mapspeak.evaluation.agents.driver import read_map_text
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 from served import connect, pictures_of, report_of, text_of
@@ -105,10 +106,12 @@ async def test_the_text_about_a_building_of_hundreds_of_rooms_stays_short(tmp_pa
     aisle = ["." * 6] * 5
     floor = ["######", *room, "##..##", *aisle, "##..##", *room]
     grid = grid_from_text("\n".join(line * 40 for line in floor * 8), resolution_m=0.4)
-    async with connect(FakeRobot(grid, pose=Pose(3.0, 3.0)), tmp_path) as client:
+    async with connect(FakeRobot(grid, pose=Pose(49.4, 28.4)), tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
         measured = text_of(await client.call_tool("measure", {}))
-    assert "## Rooms, smallest first (showing 40 of" in text
+    assert "## Rooms, smallest first (showing 4" in text
+    ways_m = [row.number("path m") for row in read_map_text(text).rows("Rooms")]
+    assert min(ways_m) < 5.0
     assert "more, in between, left out" in text
     assert len(text) <= MOST_CHARACTERS
     assert len(measured) <= MOST_CHARACTERS

@@ -111,12 +111,13 @@ class MapPart(Generic[Item]):
         return cls(tuple(items[:n]), len(items))
 
     @classmethod
-    def ends(cls, items: Sequence[Item], most: int) -> Self:
-        """Return things from both ends of a list that is too long."""
+    def ends(cls, items: Sequence[Item], most: int, *, nearest: Item | None = None) -> Self:
+        """Return things from both ends of a list that is too long, and the nearest one."""
         if len(items) <= SLACK * most:
             return cls(tuple(items), len(items))
         half = most // 2
-        return cls((*items[:half], *items[-half:]), len(items), gap_after=half)
+        between = [item for item in items[half:-half] if item is nearest]
+        return cls((*items[:half], *between, *items[-half:]), len(items), gap_after=half)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +127,7 @@ class MapView:
     Attributes:
         world: All there is.
         look: How it is looked at.
-        rooms: With open spaces, smallest first; of very many the smallest and the largest.
+        rooms: With open spaces, smallest first; of very many both ends and the nearest.
         corridors: In the same way.
         doors: Nearest first.
         frontiers: Best first.
@@ -162,7 +163,11 @@ def view_of(world: WorldModel, look: MapLook) -> MapView:
     return MapView(
         world=world,
         look=look,
-        rooms=MapPart.ends(rooms, MOST_ROOMS),
+        rooms=MapPart.ends(
+            rooms,
+            MOST_ROOMS,
+            nearest=min(rooms, key=lambda room: path_or_far(room.widest), default=None),
+        ),
         corridors=MapPart.ends(corridors, MOST_CORRIDORS),
         doors=MapPart.first(
             sorted(doors, key=lambda door: path_or_far(world.find_crossing(door))), MOST_DOORS
