@@ -174,6 +174,11 @@ class FakeRobot:
         if self._current is not None:
             self._end(GoalState.CANCELLED)
 
+    def end_goal(self, state: GoalState, *, pose: Pose | None = None) -> None:
+        """Lets the navigation end the goal it follows, with the robot at some pose."""
+        self.pose = pose or self.pose
+        self._end(state)
+
     def _end(self, state: GoalState) -> None:
         assert self._current is not None
         self.ended[self._current] = GoalStatus(state=state, distance_left_m=0.0)

@@ -1,5 +1,6 @@
 """Tools that drive several times ask a person once, and go no farther than what was agreed to."""
 
+import math
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from fakes import FakeRobot
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
+from mapspeak.robot import GoalState
 from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy
 from served import MODES, connect, report_of, text_of
 
@@ -129,6 +131,21 @@ async def test_a_word_for_one_thing_is_none_for_another(tmp_path: Path) -> None:
         "May the robot drive to (3.00",
         "May the robot explore",
     ]
+
+
+async def test_one_word_covers_a_drive_to_look_and_the_turn_at_its_end(tmp_path: Path) -> None:
+    person, robot = Person(), FakeRobot(HALL, pose=START)
+    async with connect(
+        robot, tmp_path, guard=careful(tmp_path), toolsets=("drive",), on_question=person
+    ) as client:
+        sent = report_of(await client.call_tool("navigate_to", {"place": "F1", "wait_s": 0}))
+        at = sent["goal"]
+        robot.end_goal(GoalState.ARRIVED, pose=Pose(at["x"], at["y"], math.radians(180)))
+        await client.call_tool("wait_for_goal", {})
+    assert len(robot.goals) == 2
+    (question,) = person.questions
+    errand = "drive to F1 and turn there to look, up to 4 drives within 600 s"
+    assert question == f"May the robot {errand}? {LIMITS}"
 
 
 async def test_after_a_stop_a_person_is_asked_again(tmp_path: Path) -> None:

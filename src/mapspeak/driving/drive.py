@@ -110,7 +110,15 @@ class DriveBook:
         finally:
             self._n_preparing -= 1
 
-    async def start(self, goal: Pose, *, place: str, ticket: int, client: str = "") -> Drive:
+    async def start(
+        self,
+        goal: Pose,
+        *,
+        place: str,
+        ticket: int,
+        client: str = "",
+        is_for_picture: bool = False,
+    ) -> Drive:
         """Send a goal to the robot, or let it wait its turn.
 
         A newer drive of the same client replaces the older one.
@@ -120,6 +128,7 @@ class DriveBook:
             place: What it was called.
             ticket: From `preparing`.
             client: Who asks.
+            is_for_picture: The robot comes to see what is there.
 
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
@@ -138,6 +147,8 @@ class DriveBook:
                 robot_goal_id=None,
                 started_s=self._robot.now_s,
                 client=client,
+                ticket=ticket,
+                is_for_picture=is_for_picture,
             )
             is_other = busy is not None and busy.client != client
             when_busy = self._when_busy if is_other else WhenBusy.REPLACE

@@ -21,6 +21,8 @@ class Drive:
         place: What the goal was called when it was asked for.
         robot_goal_id: What the robot's navigation calls it; None before it was sent there.
         client: Who asked for it; empty where there can be only one.
+        ticket: What it was started with; a stop since then ends also what was to follow it.
+        is_for_picture: Nobody asked for a heading, and the robot comes to see what is there.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
         ended_at: Where the robot was when it was heard that the drive had ended; None where that
             is not known.
@@ -33,6 +35,8 @@ class Drive:
     robot_goal_id: str | None
     started_s: float
     client: str = ""
+    ticket: int = 0
+    is_for_picture: bool = False
     begun_at: Point | None = None
     ended_at: Point | None = None
     heard: GoalStatus = JUST_SENT

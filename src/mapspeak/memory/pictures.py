@@ -9,6 +9,7 @@ from datetime import datetime
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import LaserRing
+from mapspeak.spatial.viewing import CameraView
 
 MOST_PICTURES = 500
 """How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
@@ -58,6 +59,13 @@ class TakenPicture:
             return True
         return abs(wrap_angle(bearing_rad)) <= self.horizontal_fov_rad / 2 + BESIDE_RAD
 
+    @property
+    def view(self) -> CameraView:
+        """Where it was taken, and how wide it is or probably is."""
+        if self.horizontal_fov_rad is None:
+            return CameraView(self.pose)
+        return CameraView(self.pose, self.horizontal_fov_rad / 2)
+
     def bearing_of(self, column_px: float) -> float:
         """Return the direction of a column from the heading, left positive, in radians.
 
@@ -101,6 +109,11 @@ class PictureBook:
     def taken(self) -> tuple[TakenPicture, ...]:
         """All that can be spoken of, the oldest first."""
         return tuple(self._taken.values())
+
+    @property
+    def views(self) -> tuple[CameraView, ...]:
+        """Where they were taken, the oldest first."""
+        return tuple(each.view for each in self._taken.values())
 
     def add(self, picture: TakenPicture, data: bytes, *, media_type: str) -> TakenPicture:
         """Return a picture that was just taken with its id, and a name where no folder gave one."""

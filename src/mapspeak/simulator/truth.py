@@ -107,7 +107,7 @@ class TrueFloor:
         As on every map made by a LiDAR, a cell that a surface touches is solid.
         """
         is_seen = np.zeros(self.solid.cells.shape, dtype=np.uint8)
-        for point in self._viewpoints():
+        for point in self.viewpoints:
             world_from_base = self._world.start @ Pose(point.x, point.y)
             ranges = np.minimum(measure_ranges(self._solids.edges, world_from_base), MAX_RANGE_M)
             star = (BEAM_DIRECTIONS * ranges[:, None] + (point.x, point.y)) / CELL_SIZE_M
@@ -118,7 +118,8 @@ class TrueFloor:
         cells = np.where(is_solid, _SOLID, np.where(is_seen > 0, _FREE, UNKNOWN))
         return _grid(cells, self.solid.origin.point)
 
-    def _viewpoints(self) -> list[Point]:
+    @cached_property
+    def viewpoints(self) -> list[Point]:
         """Return places where the robot can stand, spread over a square lattice."""
         rows, cols = np.nonzero(self.standable)
         every = round(_LOOK_EVERY_M / CELL_SIZE_M)

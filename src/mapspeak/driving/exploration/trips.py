@@ -59,9 +59,13 @@ async def turn_to(
     with site.drives.preparing() as ticket:
         here = (await site.robot.fetch_pose()).pose
         goal = Pose(here.x, here.y, wrap_angle(yaw_rad))
-        place = f"a turn to {goal.yaw_deg:.0f} deg"
-        drive = await site.drives.start(goal, place=place, ticket=ticket, client=client)
+        drive = await site.drives.start(goal, place=name_turn(goal), ticket=ticket, client=client)
     return await site.drives.wait(drive.goal_id, wait_s=wait_s, on_progress=on_progress)
+
+
+def name_turn(goal: Pose) -> str:
+    """Return what a drive is called that only turns the robot."""
+    return f"a turn to {goal.yaw_deg:.0f} deg"
 
 
 def spread_headings(first_rad: float, n_headings: int) -> list[float]:

@@ -75,12 +75,14 @@ class CheckedGoal:
 
     Attributes:
         comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
+        is_for_picture: Nobody asked for a heading, and the robot comes to see what is there.
     """
 
     place: Place
     pose: Pose
     check: GoalCheck
     comes_straight_on: bool = False
+    is_for_picture: bool = False
 
     @property
     def name(self) -> str:
@@ -140,7 +142,8 @@ def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None
     if check.nearest is not None and is_free:
         check = replace(check, nearest=arrival_pose(world, check.nearest.point))
     straight_on = is_free and not isinstance(place.thing, Region)
-    return CheckedGoal(place, pose, check, straight_on)
+    is_for_picture = yaw_deg is None and isinstance(place.thing, Region | Frontier)
+    return CheckedGoal(place, pose, check, straight_on, is_for_picture)
 
 
 def _has_heading(place: Place) -> bool:

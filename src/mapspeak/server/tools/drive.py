@@ -1,6 +1,7 @@
 """The tools that move the robot, and those that stop it."""
 
 import math
+from contextlib import AbstractContextManager, nullcontext
 from typing import Annotated
 
 from mcp.server.mcpserver import Context, Image
@@ -8,6 +9,7 @@ from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.trips import spread_headings, turn_to
+from mapspeak.driving.picturing import aim, end_for_picture, errand_of
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
@@ -99,9 +101,15 @@ class DriveTools:
         drives = self._session.drives
         with drives.preparing() as ticket:
             goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
-            drive = await drives.start(
-                goal.pose, place=goal.title, ticket=ticket, client=client_of(context)
-            )
+            goal = await aim(self._session, goal)
+            with _errand_of(goal.title, is_for_picture=goal.is_for_picture):
+                drive = await drives.start(
+                    goal.pose,
+                    place=goal.title,
+                    ticket=ticket,
+                    client=client_of(context),
+                    is_for_picture=goal.is_for_picture,
+                )
         return await self._wait(context, drive.goal_id, wait_s)
 
     @tool(
@@ -150,9 +158,16 @@ class DriveTools:
         return f"The robot was told to stop, and to give up every goal, whoever sent it.{told}"
 
     async def _wait(self, context: Context, goal_id: str | None, wait_s: float) -> DriveAnswer:
-        report = await self._session.drives.wait(
-            goal_id, wait_s=wait_s, on_progress=tell_progress(context)
-        )
+        robot, on_progress = self._session.robot, tell_progress(context)
+        until_s = robot.now_s + wait_s
+        report = await self._session.drives.wait(goal_id, wait_s=wait_s, on_progress=on_progress)
+        drive = report.drive
+        if wait_s > 0 and drive.client == client_of(context):
+            left_s = max(until_s - robot.now_s, 0.0)
+            with _errand_of(drive.place, is_for_picture=drive.is_for_picture):
+                report = await end_for_picture(
+                    self._session, report, wait_s=left_s, on_progress=on_progress
+                )
         is_over = report.status.state.is_final and self._session.drives.under_way is None
         foreign = await self._session.robot.fetch_foreign_goals() if is_over else ()
         return DriveAnswer.of(report, foreign_goals=foreign)
@@ -229,6 +244,11 @@ class TurnTools:
             on_progress=tell_progress(context),
             client=client_of(context),
         )
+
+
+def _errand_of(place: str, *, is_for_picture: bool) -> AbstractContextManager[None]:
+    """Let one word of a person do for a drive and the turn at its end."""
+    return on_errand(errand_of(place)) if is_for_picture else nullcontext()
 
 
 def _count_all_around(picture: CameraPicture) -> int:

@@ -1,0 +1,108 @@
+"""Drives that end where a picture is worth taking."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Protocol
+
+from mapspeak.driving.drive import OnProgress
+from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.exploration.trips import TripContext, name_turn
+from mapspeak.errors import GoalError, PolicyError
+from mapspeak.geometry import Pose
+from mapspeak.memory import PictureBook
+from mapspeak.places.relations.choosing import CheckedGoal
+from mapspeak.places.viewpoint import aim_for_picture, face_new_walls, find_room_near
+from mapspeak.robot import GoalState
+from mapspeak.safety import Errand
+
+TURN_S = 10.0
+"""Robot time that a turn on arrival may take."""
+MOST_DRIVES = 4
+"""To the goal, to where it fits after more of it is mapped, and the turn."""
+ERRAND_S = 600.0
+
+
+class PictureContext(TripContext, Protocol):
+    """A robot, its drives, its map and the pictures it took; a session is one."""
+
+    @property
+    def pictures(self) -> PictureBook:
+        """The pictures taken lately."""
+        ...
+
+
+async def aim(site: PictureContext, goal: CheckedGoal) -> CheckedGoal:
+    """Choose the heading to arrive with, where nobody asked for one and a picture is wanted."""
+    if not goal.is_for_picture:
+        return goal
+    world, views = await site.fetch_world_model(), site.pictures.views
+    return await site.compute(partial(aim_for_picture, world, goal, views))
+
+
+def errand_of(place: str) -> Errand:
+    """Return what a person agrees to at once: the drive to a place, and what ends it there."""
+    what = f"drive to {place} and turn there to look"
+    return Errand(what=what, n_drives=MOST_DRIVES, duration_s=ERRAND_S)
+
+
+async def end_for_picture(
+    site: PictureContext, report: DriveReport, *, wait_s: float, on_progress: OnProgress
+) -> DriveReport:
+    """End a drive that is for a picture by what the robot has mapped on the way.
+
+    Where it proves that the robot does not fit at the goal, it is sent to the nearest place where
+    it does. Where it has arrived, it is turned to what no picture shows.
+
+    Args:
+        wait_s: Robot time to wait for another drive.
+
+    Returns:
+        Of the drive that goes on, or of this one with the pose after the turn; the same report
+        where nothing is to be done, or another drive has been started by now.
+    """
+    drive, state = report.drive, report.status.state
+    latest = site.drives.latest
+    if not drive.is_for_picture or latest is None or latest.goal_id != drive.goal_id:
+        return report
+    try:
+        if state is GoalState.BLOCKED:
+            report = await _drive_nearby(site, report, wait_s, on_progress)
+        if report.status.state is GoalState.ARRIVED:
+            report = await _turn_to_new_walls(site, report, on_progress)
+    except (GoalError, PolicyError):
+        # The robot was stopped or belongs to somebody else: how this drive ended stays true.
+        return report
+    return report
+
+
+async def _drive_nearby(
+    site: PictureContext, report: DriveReport, wait_s: float, on_progress: OnProgress
+) -> DriveReport:
+    """Send the robot to the place nearest to a goal at which it does not fit."""
+    drive = report.drive
+    world, views = await site.fetch_world_model(), site.pictures.views
+    point = await site.compute(partial(find_room_near, world, drive.goal.point))
+    if point is None:
+        return report
+    pose = Pose(point.x, point.y, drive.goal.yaw_rad)
+    pose = await site.compute(partial(face_new_walls, world, pose, views))
+    nearby = await site.drives.start(
+        pose, place=drive.place, ticket=drive.ticket, client=drive.client, is_for_picture=True
+    )
+    return await site.drives.wait(nearby.goal_id, wait_s=wait_s, on_progress=on_progress)
+
+
+async def _turn_to_new_walls(
+    site: PictureContext, report: DriveReport, on_progress: OnProgress
+) -> DriveReport:
+    drive = report.drive
+    world, views = await site.fetch_world_model(), site.pictures.views
+    pose = await site.compute(partial(face_new_walls, world, report.pose, views))
+    if pose == report.pose:
+        return report
+    turn = await site.drives.start(
+        pose, place=name_turn(pose), ticket=drive.ticket, client=drive.client
+    )
+    turned = await site.drives.wait(turn.goal_id, wait_s=TURN_S, on_progress=on_progress)
+    faced = replace(drive.goal, yaw_rad=pose.yaw_rad)
+    return replace(turned, drive=replace(drive, goal=faced), status=report.status)

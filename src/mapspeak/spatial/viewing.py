@@ -1,0 +1,141 @@
+"""Which walls a camera shows: those that pictures have shown, and what each heading would add."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.visibility import cast_rays
+
+SIGHT_M = 8.0
+"""A wall that is farther away is in a picture without being shown by it."""
+HALF_VIEW_RAD = math.radians(30.0)
+"""Half the opening of a common camera, where the robot does not say."""
+N_RAYS = 720
+"""At the end of sight, neighbouring rays are 7 cm apart."""
+_RAY_RAD = math.tau / N_RAYS
+_ANGLES_RAD: FloatArray = np.arange(N_RAYS, dtype=np.float64) * _RAY_RAD
+NO_WALL = -1
+
+
+@dataclass(frozen=True, slots=True)
+class CameraView:
+    """Where a picture was taken, and how wide it is.
+
+    Attributes:
+        pose: In the map frame; the camera looks along its heading.
+    """
+
+    pose: Pose
+    half_view_rad: float = HALF_VIEW_RAD
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panorama:
+    """What rays to all sides of a place end at, counter-clockwise from the x axis of the map.
+
+    A wall is known by the free cell before it, so that its two sides are two walls.
+
+    Attributes:
+        walls: The flat index of that cell for each ray, shape (N_RAYS,); NO_WALL where the ray ends
+            in the unknown or meets nothing within sight.
+        metres: How long each ray is.
+        is_open: The ray ends in the unknown.
+    """
+
+    grid: OccupancyGrid
+    walls: IntArray = field(repr=False)
+    metres: FloatArray = field(repr=False)
+    is_open: Mask = field(repr=False)
+
+    def wall_m_by_heading(self, half_view_rad: float, *, but: Mask | None = None) -> FloatArray:
+        """Return how much wall a picture in the direction of each ray would show, in metres.
+
+        Args:
+            but: Walls that do not count, as a mask of the grid.
+        """
+        counts = self.walls != NO_WALL
+        if but is not None:
+            counts &= ~but.ravel()[self.walls]
+        # Each cell counts once, for the first ray that meets it.
+        first = np.zeros(N_RAYS, dtype=np.float64)
+        _, at = np.unique(np.where(counts, self.walls, NO_WALL), return_index=True)
+        first[at] = self.grid.resolution_m
+        return sum_by_heading(np.where(counts, first, 0.0), half_view_rad)
+
+
+def sum_by_heading(by_ray: FloatArray, half_view_rad: float) -> FloatArray:
+    """Sum what each ray counts over the rays of a picture in the direction of each."""
+    half = max(round(half_view_rad / _RAY_RAD), 1)
+    if 2 * half + 1 >= N_RAYS:
+        return np.full(N_RAYS, by_ray.sum())
+    around = np.concatenate([by_ray[-half:], by_ray, by_ray[:half]])
+    sums = np.cumsum(np.pad(around, (1, 0)))
+    return np.asarray(sums[2 * half + 1 :] - sums[: -2 * half - 1], dtype=np.float64)
+
+
+def ray_at(yaw_rad: float) -> int:
+    """Return the index of the ray in a direction of the map frame."""
+    return round(yaw_rad / _RAY_RAD) % N_RAYS
+
+
+def heading_of(ray: int) -> float:
+    """Return the direction of a ray, from -pi to pi."""
+    return math.remainder(float(_ANGLES_RAD[ray]), math.tau)
+
+
+def look_all_around(grid: OccupancyGrid, place: Point) -> Panorama:
+    """Follow rays from a place to all sides until they end."""
+    walls, metres, is_open = _follow(grid, place, _ANGLES_RAD)
+    return Panorama(grid, walls, metres, is_open)
+
+
+def mask_pictured(grid: OccupancyGrid, views: Iterable[CameraView]) -> Mask:
+    """Mark the walls that pictures show, by the free cells before them."""
+    shown = np.zeros(grid.cells.shape, dtype=np.uint8)
+    for view in views:
+        n_rays = math.ceil(2 * view.half_view_rad / _RAY_RAD)
+        turned = np.linspace(-view.half_view_rad, view.half_view_rad, n_rays)
+        walls, _, _ = _follow(grid, view.pose.point, view.pose.yaw_rad + turned)
+        shown.ravel()[walls[walls != NO_WALL]] = 1
+    # Far rays leave out cells between them, and a map moves its walls by a cell as it grows.
+    return np.asarray((cv2.dilate(shown, np.ones((3, 3), np.uint8)) > 0) & grid.free)
+
+
+def measure_pictured(
+    grid: OccupancyGrid, views: Sequence[CameraView], *, places: Iterable[Point]
+) -> float:
+    """Return the share of the walls in sight of some places that pictures show; 1 without walls."""
+    in_sight = np.zeros(grid.cells.size, dtype=np.bool_)
+    for place in places:
+        walls = look_all_around(grid, place).walls
+        in_sight[walls[walls != NO_WALL]] = True
+    n_walls = np.count_nonzero(in_sight)
+    shown = mask_pictured(grid, views).ravel()
+    return np.count_nonzero(in_sight & shown) / n_walls if n_walls else 1.0
+
+
+def _follow(
+    grid: OccupancyGrid, place: Point, angles_rad: FloatArray
+) -> tuple[IntArray, FloatArray, Mask]:
+    """Return the last free cell of each ray where it ends at a wall, its length, what it is."""
+    # No step is longer than a cell, so that no ray passes a wall between two of them.
+    steps_m = np.arange(0.0, SIGHT_M, grid.resolution_m * 0.9)
+    rays = cast_rays(
+        grid.cells.shape,
+        grid.fractional_cells_at(np.array([[place.x, place.y]])),
+        angles_rad=angles_rad - grid.origin.yaw_rad,
+        steps=steps_m / grid.resolution_m,
+    )
+    cells = rays.cells[0]
+    n_free = rays.follow(grid.free)[0].sum(axis=1)
+    beams = np.arange(len(angles_rad))
+    end = np.minimum(n_free, steps_m.size - 1)
+    has_end, is_inside = n_free < steps_m.size, rays.is_inside[0][beams, end]
+    at_wall = has_end & (n_free > 0) & is_inside & grid.occupied.ravel()[cells[beams, end]]
+    before = cells[beams, np.maximum(n_free - 1, 0)]
+    return np.where(at_wall, before, NO_WALL), steps_m[end], has_end & ~at_wall
