@@ -26,6 +26,7 @@ from mapspeak.driving.drivereport import (
 from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Point, Pose
+from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot
 from mapspeak.safety import WhenBusy
 
@@ -117,18 +118,14 @@ class DriveBook:
         place: str,
         ticket: int,
         client: str = "",
-        is_for_picture: bool = False,
+        purpose: GoalPurpose = GoalPurpose.ARRIVE,
     ) -> Drive:
         """Send a goal to the robot, or let it wait its turn.
 
         A newer drive of the same client replaces the older one.
 
         Args:
-            goal: Where to.
-            place: What it was called.
             ticket: From `preparing`.
-            client: Who asks.
-            is_for_picture: The robot comes to see what is there.
 
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
@@ -148,7 +145,7 @@ class DriveBook:
                 started_s=self._robot.now_s,
                 client=client,
                 ticket=ticket,
-                is_for_picture=is_for_picture,
+                purpose=purpose,
             )
             is_other = busy is not None and busy.client != client
             when_busy = self._when_busy if is_other else WhenBusy.REPLACE

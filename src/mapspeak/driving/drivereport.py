@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 
 JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
@@ -22,7 +23,7 @@ class Drive:
         robot_goal_id: What the robot's navigation calls it; None before it was sent there.
         client: Who asked for it; empty where there can be only one.
         ticket: What it was started with; a stop since then ends also what was to follow it.
-        is_for_picture: Nobody asked for a heading, and the robot comes to see what is there.
+        purpose: What the robot comes for.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
         ended_at: Where the robot was when it was heard that the drive had ended; None where that
             is not known.
@@ -36,7 +37,7 @@ class Drive:
     started_s: float
     client: str = ""
     ticket: int = 0
-    is_for_picture: bool = False
+    purpose: GoalPurpose = GoalPurpose.ARRIVE
     begun_at: Point | None = None
     ended_at: Point | None = None
     heard: GoalStatus = JUST_SENT

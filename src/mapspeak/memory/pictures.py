@@ -9,7 +9,7 @@ from datetime import datetime
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import LaserRing
-from mapspeak.spatial.viewing import CameraView
+from mapspeak.spatial.viewing import HALF_VIEW_RAD, CameraView
 
 MOST_PICTURES = 500
 """How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
@@ -109,6 +109,11 @@ class PictureBook:
     def taken(self) -> tuple[TakenPicture, ...]:
         """All that can be spoken of, the oldest first."""
         return tuple(self._taken.values())
+
+    @property
+    def half_view_rad(self) -> float:
+        """Half the opening of the camera by its latest picture, or of a common one."""
+        return self.views[-1].half_view_rad if self._taken else HALF_VIEW_RAD
 
     @property
     def views(self) -> tuple[CameraView, ...]:

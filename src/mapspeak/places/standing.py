@@ -1,7 +1,6 @@
 """Where and how a robot stands when it is sent to a place."""
 
 import itertools
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,18 +8,19 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
-from mapspeak.spatial.grid import IntArray
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
-from mapspeak.spatial.visibility import cast_rays
+from mapspeak.spatial.viewing import HALF_VIEW_RAD, floor_by_heading, heading_rad
 from mapspeak.worldmodel.model import WorldModel, find_crossing
 from mapspeak.worldmodel.recollection import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision
 
+EVERY_M = 1.0
+"""Places to look from are this far from each other."""
+NARROW_COMFORT_M = 0.1
+"""What it should have at least where many places are compared."""
 COMFORT_M = 0.15
 """How much more than its radius a robot should have around it where it is sent to stand."""
-N_RAYS = 72
-HALF_VIEW_RAD = math.radians(30)
-"""What is seen at once: half the opening of a common camera."""
 
 
 def find_standing_point(world: WorldModel, region: Region) -> Point | None:
@@ -145,21 +145,34 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
     return Pose(pose.x, pose.y, pose.point.bearing_to(thing.position))
 
 
+def spread_places(
+    world: WorldModel, *, within: Mask | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return places spread over the reachable floor, each where its square has most room.
+
+    Args:
+        within: Which floor matters, as a mask of the map; None where all does.
+
+    Returns:
+        The places, shape (n, 2), and how far the robot has to drive to each, in metres.
+    """
+    counts = world.distances.reachable if within is None else world.distances.reachable & within
+    clear_m = np.where(counts, world.map.clearance_m, 0.0)
+    rows, cols = np.nonzero(clear_m >= world.radius_m + NARROW_COMFORT_M)
+    every = max(round(EVERY_M / world.grid.resolution_m), 1)
+    roomiest_first = np.argsort(-clear_m[rows, cols], kind="stable")
+    rows, cols = rows[roomiest_first], cols[roomiest_first]
+    squares = (rows // every) * (world.grid.n_cols // every + 1) + cols // every
+    _, first = np.unique(squares, return_index=True)
+    points = world.grid.points_at(rows[first], cols[first])
+    ways_m = world.distances.distances_at(rows[first], cols[first])
+    is_reached = np.isfinite(ways_m)
+    return points[is_reached], ways_m[is_reached]
+
+
 def facing_in(world: WorldModel, region: Region, point: Point) -> float:
     """Return the heading, in radians, in which most of a region lies before a robot at a point."""
-    angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
-    grid = world.grid
-    step_m = grid.resolution_m
-    steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
-    rays = cast_rays(
-        grid.cells.shape,
-        grid.fractional_cells_at(np.array([[point.x, point.y]])),
-        angles_rad=angles - grid.origin.yaw_rad,
-        steps=steps_m / step_m,
-    )
-    is_seen = rays.follow((world.rooms.labels == region.index) & grid.free)[0]
-    sights_m = is_seen.sum(axis=1) * step_m
-    half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
-    around = np.concatenate([sights_m[-half:], sights_m, sights_m[:half]])
-    seen = np.convolve(around, np.ones(2 * half + 1), mode="valid")
-    return math.remainder(float(angles[int(np.argmax(seen))]), math.tau)
+    floor = world.rooms.labels == region.index
+    here = np.array([[point.x, point.y]])
+    areas_m2 = floor_by_heading(world.grid, floor, here, HALF_VIEW_RAD)
+    return heading_rad(int(areas_m2[0].argmax()))

@@ -1,7 +1,7 @@
 """Every toolset by its name."""
 
 from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.tools.drive import DriveTools, TurnTools
+from mapspeak.server.tools.drive import DriveTools, ViewTools
 from mapspeak.server.tools.explore import ExploreTools
 from mapspeak.server.tools.finding import FindTools
 from mapspeak.server.tools.look import LookTools
@@ -34,7 +34,7 @@ def build_toolsets(
     return {
         "look": tools_of(LookTools(session, representation)),
         "places": tools_of(find, PlaceTools(session)),
-        "drive": tools_of(DriveTools(session), TurnTools(session)),
+        "drive": tools_of(DriveTools(session), ViewTools(session)),
         "explore": tools_of(ExploreTools(session)),
         "routes": tools_of(RouteTools(session)),
         "paper": tools_of(PaperTools(session)),

@@ -1,4 +1,4 @@
-"""Which walls a camera shows: those that pictures have shown, and what each heading would add."""
+"""What a camera shows from a place: the floor and the walls in each heading, and what is new."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -20,6 +20,8 @@ N_RAYS = 720
 _RAY_RAD = math.tau / N_RAYS
 _ANGLES_RAD: FloatArray = np.arange(N_RAYS, dtype=np.float64) * _RAY_RAD
 NO_WALL = -1
+N_HEADINGS = 72
+"""In which floor is measured, counter-clockwise from the x axis of the map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +71,58 @@ class Panorama:
 
 
 def sum_by_heading(by_ray: FloatArray, half_view_rad: float) -> FloatArray:
-    """Sum what each ray counts over the rays of a picture in the direction of each."""
-    half = max(round(half_view_rad / _RAY_RAD), 1)
-    if 2 * half + 1 >= N_RAYS:
-        return np.full(N_RAYS, by_ray.sum())
-    around = np.concatenate([by_ray[-half:], by_ray, by_ray[:half]])
-    sums = np.cumsum(np.pad(around, (1, 0)))
-    return np.asarray(sums[2 * half + 1 :] - sums[: -2 * half - 1], dtype=np.float64)
+    """Sum what each ray counts over the rays of a picture in its direction.
+
+    Args:
+        by_ray: All around, evenly spread, along the last axis.
+    """
+    n_rays = by_ray.shape[-1]
+    half = min(max(round(half_view_rad / (math.tau / n_rays)), 1), (n_rays - 1) // 2)
+    around = np.concatenate([by_ray[..., -half:], by_ray, by_ray[..., :half]], axis=-1)
+    before = [(0, 0)] * (by_ray.ndim - 1)
+    sums = np.cumsum(np.pad(around, [*before, (1, 0)]), axis=-1)
+    return np.asarray(sums[..., 2 * half + 1 :] - sums[..., : -2 * half - 1], dtype=np.float64)
+
+
+def floor_by_heading(
+    grid: OccupancyGrid,
+    floor: Mask,
+    places: FloatArray,
+    half_view_rad: float,
+    *,
+    reach_m: float = SIGHT_M,
+) -> FloatArray:
+    """Return how much of some floor pictures from places show, by heading, in m2.
+
+    Args:
+        floor: What counts, as a mask of the grid.
+        places: Points, shape (n, 2).
+
+    Returns:
+        Shape (n, N_HEADINGS).
+    """
+    angles: FloatArray = np.arange(N_HEADINGS, dtype=np.float64) * (math.tau / N_HEADINGS)
+    # No step is longer than a cell, so that no ray passes a wall between two of them.
+    step_m = grid.resolution_m
+    steps_m = np.arange(step_m, reach_m + 1e-9, step_m)
+    rays = cast_rays(
+        grid.cells.shape,
+        grid.fractional_cells_at(places),
+        angles_rad=angles - grid.origin.yaw_rad,
+        steps=steps_m / grid.resolution_m,
+    )
+    counts = rays.follow(grid.free) & floor.ravel()[rays.cells]
+    return sum_by_heading(counts @ (steps_m * step_m * math.tau / N_HEADINGS), half_view_rad)
+
+
+def heading_index(yaw_rad: float) -> int:
+    """Return the index of the heading nearest to a direction."""
+    return round(yaw_rad / (math.tau / N_HEADINGS)) % N_HEADINGS
+
+
+def heading_rad(index: int) -> float:
+    """Return a heading by its index, from -pi to pi."""
+    return math.remainder(index * math.tau / N_HEADINGS, math.tau)
 
 
 def ray_at(yaw_rad: float) -> int:
@@ -92,6 +139,19 @@ def look_all_around(grid: OccupancyGrid, place: Point) -> Panorama:
     """Follow rays from a place to all sides until they end."""
     walls, metres, is_open = _follow(grid, place, _ANGLES_RAD)
     return Panorama(grid, walls, metres, is_open)
+
+
+def is_in_sight(grid: OccupancyGrid, place: Point, target: Point, *, own_m: float) -> bool:
+    """Return True when free floor lies between a place and a target near enough to be looked at.
+
+    Args:
+        own_m: So near to the target nothing hides it: it is solid itself, or hangs on a wall.
+    """
+    away_m = place.distance_to(target)
+    if away_m > SIGHT_M:
+        return False
+    bearing = np.array([place.bearing_to(target)])
+    return bool(_follow(grid, place, bearing)[1][0] >= away_m - own_m)
 
 
 def mask_pictured(grid: OccupancyGrid, views: Iterable[CameraView]) -> Mask:

@@ -14,16 +14,13 @@ from mapspeak.memory import TakenPicture
 from mapspeak.memory.search.answer import Verdict
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import check_place
+from mapspeak.places.standing import spread_places
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.grid import FloatArray, Mask
-from mapspeak.spatial.visibility import cast_rays
+from mapspeak.spatial.grid import Mask
+from mapspeak.spatial.viewing import floor_by_heading, heading_index, heading_rad
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
-N_RAYS = 72
-EVERY_M = 1.0
-"""Places to look from are this far from each other."""
-COMFORT_M = 0.1
 LEAST_AREA_M2 = 1.0
 """Less unseen floor than this in view is not worth a look."""
 STOP_M = 0.5
@@ -111,13 +108,9 @@ def find_candidates(
 
 def unseen_area_m2(world: WorldModel, pose: Pose, *, seen: SeenFloor) -> float:
     """Return how much floor that was not looked at yet comes into view in a pose."""
-    areas_m2 = _areas_by_heading(
-        world,
-        seen.mask_on(world.grid, around=pose.point),
-        np.array([[pose.x, pose.y]]),
-        seen.half_view_rad,
-    )
-    return float(areas_m2[0, _heading_index(pose.yaw_rad)])
+    seen_mask, here = seen.mask_on(world.grid, around=pose.point), np.array([[pose.x, pose.y]])
+    areas_m2 = floor_by_heading(world.grid, ~seen_mask, here, seen.half_view_rad, reach_m=REACH_M)
+    return float(areas_m2[0, heading_index(pose.yaw_rad)])
 
 
 def _find_remembered(world: WorldModel, thing: str) -> tuple[list[Place], list[Place]]:
@@ -181,9 +174,9 @@ def _frontiers(
     if not frontiers:
         return
     places = np.array([[each.pose.x, each.pose.y] for each in frontiers])
-    areas_m2 = _areas_by_heading(world, seen, places, half_rad)
+    areas_m2 = floor_by_heading(world.grid, ~seen, places, half_rad, reach_m=REACH_M)
     for frontier, by_heading in zip(frontiers, areas_m2, strict=True):
-        unseen_m2 = float(by_heading[_heading_index(frontier.pose.yaw_rad)])
+        unseen_m2 = float(by_heading[heading_index(frontier.pose.yaw_rad)])
         yield _rated(
             world,
             CandidateKind.FRONTIER,
@@ -200,13 +193,16 @@ def _unseen(
     world: WorldModel, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
 ) -> Iterator[SearchCandidate]:
     """Return the best heading at each of many places from which something unseen is in view."""
-    places, ways_m = _places_to_stand(world)
-    areas_m2 = _areas_by_heading(world, seen, places, half_rad)
+    # The robot may turn where it is.
+    points, path_m = spread_places(world)
+    places = np.concatenate([np.array([[world.robot.x, world.robot.y]]), points])
+    ways_m = np.concatenate([np.zeros(1), path_m])
+    areas_m2 = floor_by_heading(world.grid, ~seen, places, half_rad, reach_m=REACH_M)
     best = areas_m2.argmax(axis=1)
     for place, path_m, index, by_heading in zip(places, ways_m, best, areas_m2, strict=True):
         area_m2 = float(by_heading[index])
         if area_m2 >= LEAST_AREA_M2:
-            yaw_rad = wrap_angle(index * math.tau / N_RAYS)
+            yaw_rad = heading_rad(int(index))
             yield _rated(
                 world,
                 CandidateKind.UNSEEN,
@@ -248,53 +244,3 @@ def _rated(
         rate=area_m2 * weight_of(score) / cost_m,
         frontier=frontier,
     )
-
-
-def _places_to_stand(world: WorldModel) -> tuple[FloatArray, FloatArray]:
-    """Return places spread over the floor, each where its square has most room, and ways to them.
-
-    The first one is where the robot is: it may turn there.
-    """
-    reachable = world.distances.reachable
-    clear_m = np.where(reachable, world.map.clearance_m, 0.0)
-    rows, cols = np.nonzero(clear_m >= world.radius_m + COMFORT_M)
-    every = max(round(EVERY_M / world.grid.resolution_m), 1)
-    roomiest_first = np.argsort(-clear_m[rows, cols], kind="stable")
-    rows, cols = rows[roomiest_first], cols[roomiest_first]
-    squares = (rows // every) * (world.grid.n_cols // every + 1) + cols // every
-    _, first = np.unique(squares, return_index=True)
-    points = world.grid.points_at(rows[first], cols[first])
-    ways_m = world.distances.distances_at(rows[first], cols[first])
-    is_reached = np.isfinite(ways_m)
-    here = np.array([[world.robot.x, world.robot.y]])
-    return (
-        np.concatenate([here, points[is_reached]]),
-        np.concatenate([np.zeros(1), ways_m[is_reached]]),
-    )
-
-
-def _areas_by_heading(
-    world: WorldModel, seen: Mask, places: FloatArray, half_rad: float
-) -> FloatArray:
-    """Return the unseen floor in view from places by heading, shape (places, N_RAYS), in m2."""
-    grid = world.grid
-    angles: FloatArray = np.arange(N_RAYS, dtype=np.float64) * (math.tau / N_RAYS)
-    # No step is longer than a cell, so that no ray passes a wall between two of them.
-    step_m = grid.resolution_m
-    steps_m = np.arange(step_m, REACH_M + 1e-9, step_m)
-    rays = cast_rays(
-        grid.cells.shape,
-        grid.fractional_cells_at(places),
-        angles_rad=angles - grid.origin.yaw_rad,
-        steps=steps_m / grid.resolution_m,
-    )
-    is_new = rays.follow(grid.free) & ~seen.ravel()[rays.cells]
-    by_ray = is_new @ (steps_m * step_m * math.tau / N_RAYS)
-    half = max(round(half_rad / (math.tau / N_RAYS)), 1)
-    around = np.concatenate([by_ray[:, -half:], by_ray, by_ray[:, :half]], axis=1)
-    sums = np.cumsum(np.pad(around, ((0, 0), (1, 0))), axis=1)
-    return np.asarray(sums[:, 2 * half + 1 :] - sums[:, : -2 * half - 1], dtype=np.float64)
-
-
-def _heading_index(yaw_rad: float) -> int:
-    return round(yaw_rad / (math.tau / N_RAYS)) % N_RAYS

@@ -8,12 +8,11 @@ import numpy as np
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import IntArray, Mask
+from mapspeak.spatial.viewing import HALF_VIEW_RAD
 from mapspeak.spatial.visibility import cast_rays
 
 REACH_M = 4.0
 """Things are known from no farther, whatever the camera shows of the background."""
-HALF_VIEW_RAD = math.radians(30)
-"""Half the opening of a common camera, where the robot does not say."""
 LOOKED_NEAR_M = 0.4
 LOOKED_RAD = math.radians(15)
 SAME_PLACE_M = 0.1

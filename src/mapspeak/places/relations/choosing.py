@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose, wrap_angle
@@ -69,20 +70,29 @@ def find_group(world: WorldModel, words: str) -> tuple[Place, ...]:
     )
 
 
+class GoalPurpose(StrEnum):
+    """What a robot comes to a place for."""
+
+    ARRIVE = "arrive"
+    LOOK = "look"
+    """To see what is there: nobody asked for a heading."""
+    CHECK = "check"
+    """To see whether something remembered is there."""
+
+
 @dataclass(frozen=True, slots=True)
 class CheckedGoal:
     """A pose to drive to, judged against the map.
 
     Attributes:
         comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
-        is_for_picture: Nobody asked for a heading, and the robot comes to see what is there.
     """
 
     place: Place
     pose: Pose
     check: GoalCheck
     comes_straight_on: bool = False
-    is_for_picture: bool = False
+    purpose: GoalPurpose = GoalPurpose.ARRIVE
 
     @property
     def name(self) -> str:
@@ -142,8 +152,14 @@ def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None
     if check.nearest is not None and is_free:
         check = replace(check, nearest=arrival_pose(world, check.nearest.point))
     straight_on = is_free and not isinstance(place.thing, Region)
-    is_for_picture = yaw_deg is None and isinstance(place.thing, Region | Frontier)
-    return CheckedGoal(place, pose, check, straight_on, is_for_picture)
+    return CheckedGoal(place, pose, check, straight_on, _purpose_of(place, yaw_deg))
+
+
+def _purpose_of(place: Place, yaw_deg: float | None) -> GoalPurpose:
+    if isinstance(place.thing, RememberedThing):
+        return GoalPurpose.CHECK
+    is_to_look = yaw_deg is None and isinstance(place.thing, Region | Frontier)
+    return GoalPurpose.LOOK if is_to_look else GoalPurpose.ARRIVE
 
 
 def _has_heading(place: Place) -> bool:

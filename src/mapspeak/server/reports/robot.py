@@ -12,7 +12,7 @@ from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import find_elsewhere
-from mapspeak.places.relations.choosing import CheckedGoal
+from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
 from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.drives import say_end
@@ -62,6 +62,8 @@ NEXT_STEP = {
     GoalState.TIMED_OUT: "The robot was told to stop. Check its navigation, then send a new goal.",
     GoalState.LOST: "The robot was told to stop. Check where it is, then send a new goal.",
 }
+AT_GOAL = "The robot stands at the goal."
+AT_THING = f"{AT_GOAL} {{look_at}} tells whether the thing is in view, and where."
 STOP_OWED = (
     "NOT STOPPED: the robot could not be told yet and may drive on. It is told as soon as it can "
     "be reached; press its own stop button if it must stand now."
@@ -133,7 +135,7 @@ def _say_next_step(report: DriveReport) -> str:
         return "Navigation says that it arrived, but the pose is uncertain: look before going on."
     if off_m > AT_GOAL_M:
         return f"Navigation says that it arrived, but the robot is {off_m:.2f} m from the goal now."
-    return "The robot stands at the goal."
+    return lead(AT_THING) if report.drive.purpose is GoalPurpose.CHECK else AT_GOAL
 
 
 class GoalAnswer(Report):

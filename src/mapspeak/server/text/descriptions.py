@@ -10,7 +10,9 @@ from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place
 from mapspeak.places.recall.asking import SURE_RATIO, describe_candidate
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
+from mapspeak.places.views.sights import Sight, find_sights, measure_shown
 from mapspeak.places.ways import standing_point
+from mapspeak.robot import CameraPicture
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support
 from mapspeak.server.text.maps import say_merits, say_size
 from mapspeak.server.text.offered import lead
@@ -27,12 +29,18 @@ from mapspeak.server.text.wording import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.spatial.viewing import HALF_VIEW_RAD
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 MOST_THINGS = 20
 MOST_VIEWS = 12
 LOW_RATIO = 0.5
+MOST_SIGHTS = 12
+CHECK = (
+    "Is it there? {write_semantic_data} notes it from this picture; "
+    "what is not there any more is given as gone."
+)
 
 
 def say_landmark(landmark: Landmark) -> str:
@@ -308,3 +316,41 @@ def _say_ground(world: WorldModel, place: Place) -> str:
     clear_m = float(world.map.clearance_m[cell.row, cell.col])
     clear = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m from any obstacle"
     return f"free floor in {room}, {clear}"
+
+
+def describe_view(world: WorldModel, place: Place, picture: CameraPicture) -> str:
+    """Return how much of a place a picture shows, and where in it what is known should be."""
+    fov_rad = picture.horizontal_fov_rad
+    half_view_rad = HALF_VIEW_RAD if fov_rad is None else fov_rad / 2
+    shown_ratio = measure_shown(world, place, picture.pose, half_view_rad)
+    sights = find_sights(world, picture.pose, half_view_rad)
+    lines = [_say_shown(place, shown_ratio)]
+    if sights:
+        lines.append("By map and memory it shows, left to right:")
+        lines += [_say_sight(each, picture, half_view_rad) for each in sights[:MOST_SIGHTS]]
+    else:
+        lines.append("No door and no remembered thing should be in it.")
+    if isinstance(place.thing, RememberedThing):
+        lines.append(lead(CHECK))
+    return "\n".join(filter(None, lines))
+
+
+def _say_shown(place: Place, shown_ratio: float | None) -> str:
+    if shown_ratio is None:
+        return f"Taken for {place.name}."
+    match place.thing:
+        case Region():
+            return f"{shown_ratio:.0%} of the floor of {place.name} is in view."
+        case RememberedThing(id=thing_id):
+            return f"{shown_ratio:.0%} of where {thing_id} may be is in view."
+        case Door():
+            return f"{place.name} is {'' if shown_ratio else 'NOT '}in view."
+        case _:
+            return f"The point is {'' if shown_ratio else 'NOT '}in view."
+
+
+def _say_sight(sight: Sight, picture: CameraPicture, half_view_rad: float) -> str:
+    what = f"{sight.id} {quote(sight.label)}" if sight.label else sight.id
+    column_px = sight.column_px(picture.width_px, half_view_rad)
+    where = "" if picture.horizontal_fov_rad is None else f" at column {column_px:.0f},"
+    return f"- {what}:{where} {sight.range_m:.1f} m away"

@@ -8,12 +8,15 @@ from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.exploration.picturing import aim, end_for_picture, errand_of
 from mapspeak.driving.exploration.trips import spread_headings, turn_to
-from mapspeak.driving.picturing import aim, end_for_picture, errand_of
 from mapspeak.errors import GoalError, LinkError
+from mapspeak.places.relations.choosing import GoalPurpose
+from mapspeak.places.views.sights import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.robot import DriveAnswer
+from mapspeak.server.text.descriptions import describe_view
 from mapspeak.server.text.drives import say_cause
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
@@ -23,6 +26,7 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
+from mapspeak.server.tools.places import OnePlace
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
@@ -102,13 +106,13 @@ class DriveTools:
         with drives.preparing() as ticket:
             goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
             goal = await aim(self._session, goal)
-            with _errand_of(goal.title, is_for_picture=goal.is_for_picture):
+            with _errand_of(goal.title, goal.purpose):
                 drive = await drives.start(
                     goal.pose,
                     place=goal.title,
                     ticket=ticket,
                     client=client_of(context),
-                    is_for_picture=goal.is_for_picture,
+                    purpose=goal.purpose,
                 )
         return await self._wait(context, drive.goal_id, wait_s)
 
@@ -164,7 +168,7 @@ class DriveTools:
         drive = report.drive
         if wait_s > 0 and drive.client == client_of(context):
             left_s = max(until_s - robot.now_s, 0.0)
-            with _errand_of(drive.place, is_for_picture=drive.is_for_picture):
+            with _errand_of(drive.place, drive.purpose):
                 report = await end_for_picture(
                     self._session, report, wait_s=left_s, on_progress=on_progress
                 )
@@ -173,11 +177,41 @@ class DriveTools:
         return DriveAnswer.of(report, foreign_goals=foreign)
 
 
-class TurnTools:
-    """Turning in place, with pictures or without."""
+class ViewTools:
+    """Turning in place, and looking: at a place from where it is best seen, and all around."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
+
+    @tool("Look at a place", ToolEffect.MOVES)
+    async def look_at(
+        self, context: Context, place: OnePlace, wait_s: Wait = 20.0
+    ) -> list[str | Image]:
+        """Drive to a clear view of a room, door, thing or point, and take a picture there.
+
+        Use it to check a place: it says how much is in view, and what should be where.
+        """
+        session = self._session
+        half_view_rad = session.pictures.half_view_rad
+        with session.drives.preparing() as ticket:
+            world = await session.fetch_world_model()
+            goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
+            if not is_there(world.robot, goal.pose):
+                drive = await session.drives.start(
+                    goal.pose,
+                    place=f"a view of {goal.title}",
+                    ticket=ticket,
+                    client=client_of(context),
+                )
+                report = await session.drives.wait(
+                    drive.goal_id, wait_s=wait_s, on_progress=tell_progress(context)
+                )
+                if report.status.state is not GoalState.ARRIVED:
+                    return [_say_no_view(report)]
+        sighting = await look_ahead(session)
+        world = await session.fetch_world_model()
+        text = await session.compute(lambda: describe_view(world, goal.place, sighting.picture))
+        return [f"{sighting.text}\n{text}", sighting.image]
 
     @tool(
         "Turn in place",
@@ -188,10 +222,7 @@ class TurnTools:
     async def turn(
         self, context: Context, by_deg: TurnBy = None, to_yaw_deg: TurnTo = None
     ) -> DriveAnswer:
-        """Turn the robot where it stands, by an angle or to a heading.
-
-        Use it to look another way.
-        """
+        """Turn the robot where it stands, by an angle or to a heading, to look another way."""
         if (by_deg is None) == (to_yaw_deg is None):
             raise GoalError(
                 "A turn is either by an angle or to a heading.",
@@ -246,9 +277,16 @@ class TurnTools:
         )
 
 
-def _errand_of(place: str, *, is_for_picture: bool) -> AbstractContextManager[None]:
+def _errand_of(place: str, purpose: GoalPurpose) -> AbstractContextManager[None]:
     """Let one word of a person do for a drive and the turn at its end."""
-    return on_errand(errand_of(place)) if is_for_picture else nullcontext()
+    return on_errand(errand_of(place)) if purpose is GoalPurpose.LOOK else nullcontext()
+
+
+def _say_no_view(report: DriveReport) -> str:
+    answer = DriveAnswer.of(report)
+    told = f"No picture yet: {answer.goal_id} to {answer.place} is {answer.state}."
+    on = answer.next_step if report.status.state.is_final else "Call look_at again to wait on."
+    return " ".join(filter(None, [told, answer.reason, on]))
 
 
 def _count_all_around(picture: CameraPicture) -> int:

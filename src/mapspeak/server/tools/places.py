@@ -18,7 +18,7 @@ OnePlace = Annotated[
     str,
     Field(
         description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3", '
-        '"second-smallest room", "R2 looking back through its door"',
+        '"second-smallest room"',
         max_length=200,
     ),
 ]
@@ -43,8 +43,7 @@ class PlaceTools:
     async def describe_place(self, place: OnePlace) -> str:
         """Describe one room, corridor, door, frontier, remembered place or point of the map.
 
-        Use it for shape, doors in their order along a corridor, what was seen there, how to get
-        there.
+        Use it for shape, doors along a corridor, what was seen there, how to get there.
         """
         world = await self._session.fetch_world_model()
         return await self._session.compute(lambda: describe_place(world, find_place(world, place)))

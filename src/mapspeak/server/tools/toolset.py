@@ -154,12 +154,32 @@ CHECKED = ("title", "minLength", "maxLength", "maxItems", "additionalProperties"
 
 def lean_input(schema: Schema) -> Schema:
     """Return the schema of a tool's arguments: what may be left out need not be null as well."""
-    return _rewrite(_rewrite(_flatten(schema), _without(CHECKED)), _short_optional)
+    lean = _rewrite(_rewrite(_flatten(schema), _without(CHECKED)), _short_optional)
+    return {**lean, "properties": _tell_items_once(lean.get("properties", {}))}
 
 
 def lean_output(schema: Schema) -> Schema:
     """Return the schema of a report: its fields by name, for names carry units and kinds."""
     return schema and {"type": "object", "properties": {name: {} for name in schema["properties"]}}
+
+
+def _tell_items_once(properties: dict[str, Schema]) -> dict[str, Schema]:
+    """Refer a list of objects like those of an argument before it to that argument."""
+    told: dict[str, Schema] = {}
+    for name, part in properties.items():
+        same = next((before for before in told if _is_same_list(told[before], part)), None)
+        if same is not None:
+            what = filter(None, [part.get("description"), f"items as in {same}"])
+            told[name] = {**part, "items": {}, "description": "; ".join(what)}
+        else:
+            told[name] = part
+    return told
+
+
+def _is_same_list(one: Schema, other: Schema) -> bool:
+    """Return True for two lists with the same items, of which there is more to say than a type."""
+    items = one.get("items", {})
+    return bool(items == other.get("items")) and "anyOf" in items
 
 
 def _flatten(schema: Schema) -> Schema:

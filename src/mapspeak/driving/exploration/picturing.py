@@ -10,8 +10,8 @@ from mapspeak.driving.exploration.trips import TripContext, name_turn
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.memory import PictureBook
-from mapspeak.places.relations.choosing import CheckedGoal
-from mapspeak.places.viewpoint import aim_for_picture, face_new_walls, find_room_near
+from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
+from mapspeak.places.views.headings import aim_for_picture, face_new_walls, find_room_near
 from mapspeak.robot import GoalState
 from mapspeak.safety import Errand
 
@@ -33,7 +33,7 @@ class PictureContext(TripContext, Protocol):
 
 async def aim(site: PictureContext, goal: CheckedGoal) -> CheckedGoal:
     """Choose the heading to arrive with, where nobody asked for one and a picture is wanted."""
-    if not goal.is_for_picture:
+    if goal.purpose is not GoalPurpose.LOOK:
         return goal
     world, views = await site.fetch_world_model(), site.pictures.views
     return await site.compute(partial(aim_for_picture, world, goal, views))
@@ -62,7 +62,8 @@ async def end_for_picture(
     """
     drive, state = report.drive, report.status.state
     latest = site.drives.latest
-    if not drive.is_for_picture or latest is None or latest.goal_id != drive.goal_id:
+    is_latest = latest is not None and latest.goal_id == drive.goal_id
+    if drive.purpose is not GoalPurpose.LOOK or not is_latest:
         return report
     try:
         if state is GoalState.BLOCKED:
@@ -87,7 +88,7 @@ async def _drive_nearby(
     pose = Pose(point.x, point.y, drive.goal.yaw_rad)
     pose = await site.compute(partial(face_new_walls, world, pose, views))
     nearby = await site.drives.start(
-        pose, place=drive.place, ticket=drive.ticket, client=drive.client, is_for_picture=True
+        pose, place=drive.place, ticket=drive.ticket, client=drive.client, purpose=drive.purpose
     )
     return await site.drives.wait(nearby.goal_id, wait_s=wait_s, on_progress=on_progress)
 

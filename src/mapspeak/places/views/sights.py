@@ -1,0 +1,176 @@
+"""From where a place is looked at, how much of it is in view there, and what else should be."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.places.goalcheck import check_goal
+from mapspeak.places.naming import Place, Spot
+from mapspeak.places.relations.choosing import CheckedGoal, choose_goal, find_place
+from mapspeak.places.standing import choose_crossing, spread_places
+from mapspeak.spatial.rooms import Door, Region
+from mapspeak.spatial.viewing import (
+    SIGHT_M,
+    floor_by_heading,
+    heading_index,
+    heading_rad,
+    is_in_sight,
+)
+from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.recollection import RememberedThing
+
+AWAY_M = 2.0
+"""A door or a point is looked at from about so far."""
+FARTHEST_M = 4.0
+GOOD_RATIO = 0.9
+"""A place that shows so much of what the best one does is as good: the nearest is taken."""
+PATH_WEIGHT = 0.1
+"""So much of a metre off the best distance is worth a metre of way."""
+OWN_DOOR_M = 0.3
+OWN_THING_M = 0.6
+THERE_M = 0.25
+THERE_RAD = math.radians(12.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sight:
+    """Something that should be in a picture.
+
+    Attributes:
+        id: D4, T2.
+        label: What a remembered thing is; empty for a door.
+        bearing_rad: From the heading of the picture, left positive.
+    """
+
+    id: str
+    label: str
+    bearing_rad: float
+    range_m: float
+
+    def column_px(self, width_px: int, half_view_rad: float) -> float:
+        """Return where it is in a picture, from the left edge; the lens is a pinhole."""
+        half_px = width_px / 2
+        return half_px - half_px / math.tan(half_view_rad) * math.tan(self.bearing_rad)
+
+
+def choose_view(world: WorldModel, words: str, half_view_rad: float) -> CheckedGoal:
+    """Return the place that is meant, with the pose from which a picture shows most of it.
+
+    Raises:
+        GoalError: There is no such place, or the robot cannot drive to where it is in view.
+    """
+    place = find_place(world, words)
+    pose = find_viewpoint(world, place, half_view_rad)
+    if pose is None:
+        return choose_goal(world, place=words, x=None, y=None, yaw_deg=None)
+    check = check_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
+    return CheckedGoal(place, pose, check)
+
+
+def is_there(robot: Pose, pose: Pose) -> bool:
+    """Return True for a robot that stands in a pose, as nearly as navigation brings it there."""
+    is_near = robot.point.distance_to(pose.point) <= THERE_M
+    return is_near and abs(wrap_angle(robot.yaw_rad - pose.yaw_rad)) <= THERE_RAD
+
+
+def find_viewpoint(world: WorldModel, place: Place, half_view_rad: float) -> Pose | None:
+    """Find the pose from which a picture shows most of a room, or a door or a point from near.
+
+    Other places have a pose of their own.
+    """
+    match place.thing:
+        case Region() as region:
+            return _overlook(world, region, half_view_rad)
+        case Door() as door:
+            return _stand_off(world, choose_crossing(world, door))
+        case Spot(point=point, yaw_rad=None):
+            return _stand_off(world, point)
+        case _:
+            return None
+
+
+def measure_shown(
+    world: WorldModel, place: Place, pose: Pose, half_view_rad: float
+) -> float | None:
+    """Return the share of a place that a picture shows.
+
+    Of a room it is that of its floor; of a thing, that of where it may be; of a door or a point 1
+    or 0. None for other places.
+    """
+    match place.thing:
+        case Region() as region:
+            floor = world.rooms.labels == region.index
+            here = np.array([[pose.x, pose.y]])
+            shown_m2 = floor_by_heading(world.grid, floor, here, half_view_rad)
+            n_cells = int(np.count_nonzero(floor & world.grid.free))
+            whole_m2 = max(n_cells, 1) * world.grid.resolution_m * world.grid.resolution_m
+            return min(float(shown_m2[0, heading_index(pose.yaw_rad)]) / whole_m2, 1.0)
+        case RememberedThing() as remembered if remembered.thing.position is not None:
+            return world.measure_faced(remembered)
+        case Door(place=point) | Spot(point=point):
+            return float(_shows(world, pose, point, half_view_rad, own_m=OWN_DOOR_M))
+        case _:
+            return None
+
+
+def find_sights(world: WorldModel, pose: Pose, half_view_rad: float) -> tuple[Sight, ...]:
+    """Find the doors and the remembered things that a picture should show, from left to right."""
+    candidates = [*_list_candidates(world)]
+    sights = [
+        Sight(
+            id=name,
+            label=label,
+            bearing_rad=wrap_angle(pose.point.bearing_to(point) - pose.yaw_rad),
+            range_m=pose.point.distance_to(point),
+        )
+        for name, label, point, own_m in candidates
+        if _shows(world, pose, point, half_view_rad, own_m=own_m)
+    ]
+    return tuple(sorted(sights, key=lambda each: -each.bearing_rad))
+
+
+def _list_candidates(world: WorldModel) -> Iterator[tuple[str, str, Point, float]]:
+    for door in world.rooms.doors:
+        yield door.id, "", door.place, OWN_DOOR_M
+    for remembered in world.things:
+        if remembered.thing.position is not None:
+            yield remembered.id, remembered.thing.label, remembered.thing.position, OWN_THING_M
+
+
+def _shows(
+    world: WorldModel, pose: Pose, point: Point, half_view_rad: float, *, own_m: float
+) -> bool:
+    off_rad = abs(wrap_angle(pose.point.bearing_to(point) - pose.yaw_rad))
+    is_ahead = off_rad <= half_view_rad
+    return is_ahead and is_in_sight(world.grid, pose.point, point, own_m=own_m)
+
+
+def _overlook(world: WorldModel, region: Region, half_view_rad: float) -> Pose | None:
+    """Find the pose in a region from which most of its floor is in view."""
+    floor = world.rooms.labels == region.index
+    points, ways_m = spread_places(world, within=floor)
+    if not len(points):
+        return None
+    shown_m2 = floor_by_heading(world.grid, floor, points, half_view_rad)
+    best_m2 = shown_m2.max(axis=1)
+    good = np.flatnonzero(best_m2 >= GOOD_RATIO * best_m2.max())
+    chosen = int(good[ways_m[good].argmin()])
+    x, y = points[chosen].tolist()
+    return Pose(x, y, heading_rad(int(shown_m2[chosen].argmax())))
+
+
+def _stand_off(world: WorldModel, target: Point) -> Pose | None:
+    """Find the pose from which a point is in view from about two metres."""
+    points, ways_m = spread_places(world)
+    away_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
+    costs_m = np.abs(away_m - AWAY_M) + PATH_WEIGHT * ways_m
+    for index in np.argsort(np.where(away_m <= FARTHEST_M, costs_m, math.inf), kind="stable"):
+        if away_m[index] > min(FARTHEST_M, SIGHT_M):
+            return None
+        point = Point(*points[index].tolist())
+        if is_in_sight(world.grid, point, target, own_m=OWN_DOOR_M):
+            return Pose(point.x, point.y, point.bearing_to(target))
+    return None

@@ -1,0 +1,140 @@
+"""Looking at a place: a drive to where it is in view, a picture, and what should be in it."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from mcp.client import Client
+
+from drawing import grid_from_text
+from fakes import FakeRobot, two_rooms
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.robot import GoalState
+from served import connect, pictures_of, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+WITH_SCREEN = grid_from_text(
+    """
+    ##############################
+    #............................#
+    #............................#
+    #.............##.............#
+    #.............##.............#
+    #.............##.............#
+    #.............##.............#
+    #............................#
+    #............................#
+    #............................#
+    ##############################
+    """,
+    resolution_m=0.25,
+)
+
+
+def off_rad(robot: FakeRobot, target: Point) -> float:
+    return abs(wrap_angle(robot.pose.point.bearing_to(target) - robot.pose.yaw_rad))
+
+
+def columns(told: str) -> dict[str, tuple[int, float]]:
+    found = re.findall(r"^- (\w+)\b.*at column (-?\d+), ([\d.]+) m away", told, re.MULTILINE)
+    return {name: (int(column), float(away)) for name, column, away in found}
+
+
+async def test_a_door_is_looked_at_from_some_way_off_and_straight_on(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        result = await client.call_tool("look_at", {"place": "D1"})
+    told = text_of(result)
+    assert "D1 is in view." in told
+    (column, away_m) = columns(told)["D1"]
+    assert abs(column - 32) <= 12
+    assert 1.0 <= away_m <= 4.0
+    assert len(pictures_of(result)) == 1
+
+
+async def test_of_a_room_most_of_its_floor_is_in_view(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        told = text_of(await client.call_tool("look_at", {"place": "R2"}))
+    (percent,) = re.findall(r"(\d+)% of the floor of R2 is in view", told)
+    assert int(percent) >= 60
+
+
+async def test_a_point_behind_a_screen_is_looked_at_from_where_it_is_in_view(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(WITH_SCREEN, pose=Pose(2.5, 1.4))
+    async with connect(robot, tmp_path) as client:
+        told = text_of(await client.call_tool("look_at", {"place": "4.3, 1.3"}))
+    assert "The point is in view." in told
+    assert robot.pose.x > 4.0 or robot.pose.y < 1.0
+    assert off_rad(robot, Point(4.3, 1.3)) < math.radians(5)
+
+
+async def note_fridge(client: Client) -> None:
+    await client.call_tool("look_through_camera", {})
+    noted = {
+        "name": "by the wall",
+        "description": "a corner",
+        "functional_landmarks": [{"label": "fridge", "bearing_deg": 60, "range_m": 1.0}],
+    }
+    assert not (await client.call_tool("write_semantic_data", noted)).is_error
+
+
+async def test_a_remembered_thing_is_faced_and_its_column_is_told(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await note_fridge(client)
+        told = text_of(await client.call_tool("look_at", {"place": "fridge"}))
+    assert "of where T1 may be is in view" in told
+    assert 10 <= columns(told)["T1"][0] <= 54
+    assert "write_semantic_data notes it from this picture" in told
+
+
+async def test_who_has_driven_to_a_thing_is_told_how_to_check_it(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await note_fridge(client)
+        arrived = report_of(await client.call_tool("navigate_to", {"place": "fridge"}))
+    assert "look_at tells whether the thing is in view" in arrived["next_step"]
+
+
+async def test_who_asks_again_from_where_the_robot_stands_gets_the_picture_without_a_drive(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        for _ in range(2):
+            result = await client.call_tool("look_at", {"place": "R2"})
+            assert len(pictures_of(result)) == 1
+    assert len(robot.goals) == 1
+
+
+async def test_a_drive_that_takes_longer_is_waited_for_by_asking_again(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        result = await client.call_tool("look_at", {"place": "R2", "wait_s": 0.5})
+        assert "No picture yet: G1 to a view of R2 is driving." in text_of(result)
+        assert not pictures_of(result)
+        result = await client.call_tool("look_at", {"place": "R2"})
+    assert len(pictures_of(result)) == 1
+
+
+async def test_a_drive_that_ends_blocked_gives_no_picture_and_says_why(tmp_path: Path) -> None:
+    class Blocked(FakeRobot):
+        async def send_goal(self, goal: Pose) -> str:
+            goal_id = await super().send_goal(goal)
+            self.end_goal(GoalState.BLOCKED)
+            return goal_id
+
+    async with connect(Blocked(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("look_at", {"place": "R2"})
+    assert "G1 to a view of R2 is blocked" in text_of(result)
+    assert not pictures_of(result)
+
+
+async def test_a_place_that_nobody_knows_is_an_error(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("look_at", {"place": "R77"})
+    assert result.is_error
+    assert "There is no place called 'R77'" in text_of(result)
