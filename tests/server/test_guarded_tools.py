@@ -55,6 +55,7 @@ EVERYWHERE = rectangle("everywhere", (-50.0, -50.0), (50.0, 50.0))
 MOVING_CALLS: dict[str, list[dict[str, Any]]] = {
     "navigate_to": [{"x": 3.0, "y": 1.0}],
     "turn": [{"by_deg": 90}],
+    "look_at": [{"place": "3.0, 1.0"}],
     "search_for": [{"thing": "extinguisher"}, {"thing": "extinguisher", "seen": False}],
     "follow_route": [{"stops": ["3.0, 1.0"]}],
 }
