@@ -1,8 +1,12 @@
-"""What the pictures of an exploration show: a look at the map, the first frontier, a drive, a look.
+"""What the pictures of an exploration show, led by a script and by `explore` for the camera.
 
-Judged on the true plan: how much wall that no picture has shown yet is in the picture of a stop,
-beside what the best heading from there would have shown. A stop where a drive was given up on is
-counted apart: the robot never turned to where it was to look.
+First by a script: a look at the map, the first frontier, a drive, a look, and so on. Judged on the
+true plan: how much wall that no picture has shown yet is in the picture of a stop, beside what the
+best heading from there would have shown. A stop where a drive was given up on is counted apart: the
+robot never turned to where it was to look.
+
+Then `explore` that covers the walls with the camera, beside `explore` of the map alone: its metres,
+and the walls in its pictures, of those in sight of where a robot with 10 cm of room stands.
 """
 
 import re
@@ -14,15 +18,22 @@ from pathlib import Path
 
 import anyio
 import click
+import numpy as np
 from mcp.client import Client
 from mcp_types import TextContent
 
 from benchmarks.figure import Figure
+from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.exploration.explorer import Explorer
+from mapspeak.driving.exploration.progress import Bounds, ExplorationState
 from mapspeak.links.simulated import SoloRobot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
+from mapspeak.server.tools.explore import Covered
+from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.session import Session
-from mapspeak.simulator import Simulation, load_world
+from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world
+from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.viewing import (
     CameraView,
     look_all_around,
@@ -36,6 +47,7 @@ __all__ = ["main", "measure"]
 WORLDS = ("office", "warehouse", "clinic_2", "school_1")
 MOST_GOALS = 60
 WAIT_S = 25
+ROOMY_M = BODY_RADIUS_M + 0.1
 ENOUGH_RATIO = 0.7
 LEAST_WALL_M = 1.0
 """Where even the best picture would show less, nothing is left to be shown."""
@@ -67,7 +79,11 @@ class Judge:
     def pictured_ratio(self) -> float:
         """The share of the walls in sight of where a robot can stand that the pictures show."""
         floor = self.simulation.truth.floor
-        return measure_pictured(floor.solid, self.views, places=floor.viewpoints)
+        points = np.array([[at.x, at.y] for at in floor.viewpoints])
+        is_roomy = clearance_m(floor.solid)[floor.solid.cells_at(points)] >= ROOMY_M
+        return measure_pictured(
+            floor.solid, mask_pictured(floor.solid, self.views), points[is_roomy]
+        )
 
 
 async def explore(world: str, folder: Path, seed: int) -> Judge:
@@ -96,8 +112,47 @@ async def explore(world: str, folder: Path, seed: int) -> Judge:
     return judge
 
 
+async def cover(world: str, folder: Path, seed: int, covered: Covered) -> Judge:
+    """Let the robot explore a world by itself."""
+    simulation = Simulation(load_world(world), seed=seed)
+    robot = SoloRobot(simulation, has_detector=True)
+    memory = SemanticMapStore(folder / "memory.yaml", map_id=robot.description.map_name)
+    session = Session(robot, memory, lease_s=60.0, find_model=lambda: None)
+    fov_rad = (await robot.fetch_picture()).horizontal_fov_rad or 0.0
+    judge = Judge(simulation, fov_rad / 2)
+
+    async def look() -> None:
+        await look_ahead(session)
+        judge.views.append(CameraView(simulation.truth.pose, judge.half_view_rad))
+
+    explorer = Explorer(session, look=look)
+    bounds, state = Bounds(for_camera=covered is Covered.CAMERA), ExplorationState.DRIVING
+    while not state.is_end:
+        progress = await explorer.advance(bounds, wait_s=WAIT_S, on_trip=_tell_nobody)
+        state = progress.state
+    return judge
+
+
+async def _tell_nobody(_report: DriveReport) -> None:
+    """Take what is told at the end."""
+
+
+def measure_covering(worlds: tuple[str, ...], seed: int) -> Iterator[Figure]:
+    """Explore some buildings for the map and for the camera."""
+    for world in worlds:
+        with tempfile.TemporaryDirectory() as folder:
+            plain = anyio.run(cover, world, Path(folder, "map"), seed, Covered.MAP)
+            judge = anyio.run(cover, world, Path(folder, "camera"), seed, Covered.CAMERA)
+        ratio = judge.simulation.truth.driven_m / plain.simulation.truth.driven_m
+        name = f"{world}: explore for the camera"
+        yield Figure(name=f"{name}, metres of plain explore", value=ratio, unit="")
+        yield Figure(name=f"{name}, walls pictured", value=judge.pictured_ratio, unit="")
+        yield Figure(name=f"{name}, pictures", value=len(judge.views), unit="")
+
+
 def measure(worlds: tuple[str, ...] = WORLDS, seed: int = 7) -> Iterator[Figure]:
     """Explore some buildings, and judge every picture."""
+    yield from measure_covering(worlds, seed)
     for world in worlds:
         with tempfile.TemporaryDirectory() as folder:
             judge = anyio.run(explore, world, Path(folder), seed)

@@ -7,6 +7,7 @@ from pathlib import Path
 import anyio
 import numpy as np
 import pytest
+from mcp_types import CallToolResult
 from PIL import Image
 
 from drawing import grid_from_text
@@ -40,6 +41,28 @@ async def test_only_the_layers_asked_for_are_listed(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         result = await client.call_tool("look_at_map", {"layers": ["doors"]})
     assert read_map_text(text_of(result)).tables.keys() == {"Doors"}
+
+
+async def test_who_asks_is_shown_the_walls_that_no_picture_shows_and_their_share(
+    tmp_path: Path,
+) -> None:
+    asked = {"layers": ["rooms", "unseen"], "full": True}
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        usual = await client.call_tool("look_at_map", {"full": True})
+        before = await client.call_tool("look_at_map", asked)
+        await client.call_tool("look_around", {})
+        after = await client.call_tool("look_at_map", asked)
+    assert "walls in sight" not in text_of(usual)
+    assert "Pictures show 0% of the walls in sight." in text_of(before)
+    (percent,) = re.findall(r"Pictures show (\d+)% of the walls in sight", text_of(after))
+    assert 20 <= int(percent) < 90
+    assert _count_purple(before) > _count_purple(after) > _count_purple(usual) == 0
+
+
+def _count_purple(result: CallToolResult) -> int:
+    picture = Image.open(io.BytesIO(base64.b64decode(pictures_of(result)[0].data)))
+    pixels = np.asarray(picture.convert("RGB"))
+    return int((pixels == (204, 121, 167)).all(axis=2).sum())
 
 
 async def test_a_robot_without_a_map_yet_says_what_to_start(tmp_path: Path) -> None:

@@ -53,15 +53,16 @@ TWO_SIDES = grid_from_text(
     resolution_m=0.5,
 )
 MIDDLE = Point(2.0, 0.7)
+AT_MIDDLE = np.array([[2.0, 0.7]])
 
 
 def test_a_turn_all_around_shows_every_wall() -> None:
     views = [CameraView(Pose(2.0, 0.7, yaw)) for yaw in np.arange(0.0, math.tau, math.radians(50))]
-    assert measure_pictured(ROOM, views, places=[MIDDLE]) == 1.0
+    assert measure_pictured(ROOM, mask_pictured(ROOM, views), AT_MIDDLE) == 1.0
 
 
 def test_without_pictures_no_wall_is_pictured() -> None:
-    assert measure_pictured(ROOM, [], places=[MIDDLE]) == 0.0
+    assert measure_pictured(ROOM, mask_pictured(ROOM, []), AT_MIDDLE) == 0.0
 
 
 def test_a_picture_of_one_side_leaves_the_other_sides_to_be_pictured() -> None:

@@ -99,6 +99,7 @@ class PictureBook:
     def __init__(self) -> None:
         self._taken: OrderedDict[str, TakenPicture] = OrderedDict()
         self._n_taken = 0
+        self._views: list[CameraView] = []
 
     @property
     def latest(self) -> TakenPicture | None:
@@ -113,12 +114,12 @@ class PictureBook:
     @property
     def half_view_rad(self) -> float:
         """Half the opening of the camera by its latest picture, or of a common one."""
-        return self.views[-1].half_view_rad if self._taken else HALF_VIEW_RAD
+        return self._views[-1].half_view_rad if self._views else HALF_VIEW_RAD
 
     @property
     def views(self) -> tuple[CameraView, ...]:
-        """Where they were taken, the oldest first."""
-        return tuple(each.view for each in self._taken.values())
+        """Where pictures of this map were taken, the oldest first, forgotten ones among them."""
+        return tuple(self._views)
 
     def add(self, picture: TakenPicture, data: bytes, *, media_type: str) -> TakenPicture:
         """Return a picture that was just taken with its id, and a name where no folder gave one."""
@@ -129,6 +130,7 @@ class PictureBook:
         name = f"{picture_id}-{hashlib.sha256(content).hexdigest()[:8]}.{ending}"
         taken = replace(picture, id=picture_id, name=picture.name or name)
         self._taken[picture_id] = taken
+        self._views.append(taken.view)
         while len(self._taken) > MOST_PICTURES:
             self._taken.popitem(last=False)
         return taken
@@ -137,6 +139,7 @@ class PictureBook:
         """Let nobody speak of earlier pictures any more; return whether there were any."""
         had_any = bool(self._taken)
         self._taken.clear()
+        self._views.clear()
         return had_any
 
     def find(self, said: str) -> TakenPicture | None:

@@ -1,7 +1,7 @@
 """What a camera shows from a place: the floor and the walls in each heading, and what is new."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import cv2
@@ -20,6 +20,10 @@ N_RAYS = 720
 _RAY_RAD = math.tau / N_RAYS
 _ANGLES_RAD: FloatArray = np.arange(N_RAYS, dtype=np.float64) * _RAY_RAD
 NO_WALL = -1
+LEAST_OUTLINE_M = 0.6
+"""Shorter lines, there and back, are crumbs."""
+AT_ONCE = 64
+"""Places whose rays are held in memory together."""
 N_HEADINGS = 72
 """In which floor is measured, counter-clockwise from the x axis of the map."""
 
@@ -137,8 +141,8 @@ def heading_of(ray: int) -> float:
 
 def look_all_around(grid: OccupancyGrid, place: Point) -> Panorama:
     """Follow rays from a place to all sides until they end."""
-    walls, metres, is_open = _follow(grid, place, _ANGLES_RAD)
-    return Panorama(grid, walls, metres, is_open)
+    walls, metres, is_open = _follow(grid, np.array([[place.x, place.y]]), _ANGLES_RAD)
+    return Panorama(grid, walls[0], metres[0], is_open[0])
 
 
 def is_in_sight(grid: OccupancyGrid, place: Point, target: Point, *, own_m: float) -> bool:
@@ -151,7 +155,8 @@ def is_in_sight(grid: OccupancyGrid, place: Point, target: Point, *, own_m: floa
     if away_m > SIGHT_M:
         return False
     bearing = np.array([place.bearing_to(target)])
-    return bool(_follow(grid, place, bearing)[1][0] >= away_m - own_m)
+    _, metres, _ = _follow(grid, np.array([[place.x, place.y]]), bearing)
+    return bool(metres[0, 0] >= away_m - own_m)
 
 
 def mask_pictured(grid: OccupancyGrid, views: Iterable[CameraView]) -> Mask:
@@ -160,42 +165,94 @@ def mask_pictured(grid: OccupancyGrid, views: Iterable[CameraView]) -> Mask:
     for view in views:
         n_rays = math.ceil(2 * view.half_view_rad / _RAY_RAD)
         turned = np.linspace(-view.half_view_rad, view.half_view_rad, n_rays)
-        walls, _, _ = _follow(grid, view.pose.point, view.pose.yaw_rad + turned)
+        here = np.array([[view.pose.x, view.pose.y]])
+        walls, _, _ = _follow(grid, here, view.pose.yaw_rad + turned)
         shown.ravel()[walls[walls != NO_WALL]] = 1
     # Far rays leave out cells between them, and a map moves its walls by a cell as it grows.
     return np.asarray((cv2.dilate(shown, np.ones((3, 3), np.uint8)) > 0) & grid.free)
 
 
-def measure_pictured(
-    grid: OccupancyGrid, views: Sequence[CameraView], *, places: Iterable[Point]
-) -> float:
-    """Return the share of the walls in sight of some places that pictures show; 1 without walls."""
+def measure_pictured(grid: OccupancyGrid, shown: Mask, places: FloatArray) -> float:
+    """Return the share of the walls in sight of some places that pictures show; 1 without walls.
+
+    Args:
+        shown: From `mask_pictured`.
+        places: Points, shape (n, 2); a ray every few degrees is followed from each.
+    """
     in_sight = np.zeros(grid.cells.size, dtype=np.bool_)
-    for place in places:
-        walls = look_all_around(grid, place).walls
+    for walls, _ in _follow_from(grid, places):
         in_sight[walls[walls != NO_WALL]] = True
     n_walls = np.count_nonzero(in_sight)
-    shown = mask_pictured(grid, views).ravel()
-    return np.count_nonzero(in_sight & shown) / n_walls if n_walls else 1.0
+    return np.count_nonzero(in_sight & shown.ravel()) / n_walls if n_walls else 1.0
+
+
+def outline_unpictured(grid: OccupancyGrid, shown: Mask) -> list[FloatArray]:
+    """Return lines along the walls that no picture shows, each of shape (n, 2), in metres.
+
+    Args:
+        shown: From `mask_pictured`.
+    """
+    beside = cv2.dilate(grid.occupied.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    left = (beside & grid.free & ~shown).astype(np.uint8)
+    contours, _ = cv2.findContours(left, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+    return [
+        grid.points_at(*contour[:, 0, ::-1].T.astype(np.intp))
+        for contour in contours
+        if cv2.arcLength(contour, closed=True) * grid.resolution_m >= LEAST_OUTLINE_M
+    ]
+
+
+def new_wall_by_heading(grid: OccupancyGrid, shown: Mask, places: FloatArray) -> FloatArray:
+    """Return how much wall that no picture shows lies in each heading, in metres.
+
+    A wall counts as wide as it looks, which is no more than it is long.
+
+    Args:
+        shown: From `mask_pictured`.
+        places: Points, shape (n, 2).
+
+    Returns:
+        Shape (n, N_HEADINGS), of the sector around each heading alone.
+    """
+    sectors = [
+        np.where((walls != NO_WALL) & ~shown.ravel()[walls], metres, 0.0)
+        for walls, metres in _follow_from(grid, places)
+    ]
+    widths_m = np.concatenate(sectors) if sectors else np.zeros((0, N_HEADINGS))
+    return widths_m * (math.tau / N_HEADINGS)
+
+
+def _follow_from(grid: OccupancyGrid, places: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
+    """Follow a ray in each heading from each place: where they end at walls, and their lengths."""
+    angles = np.arange(N_HEADINGS, dtype=np.float64) * (math.tau / N_HEADINGS)
+    for start in range(0, len(places), AT_ONCE):
+        walls, metres, _ = _follow(grid, places[start : start + AT_ONCE], angles)
+        yield walls, metres
 
 
 def _follow(
-    grid: OccupancyGrid, place: Point, angles_rad: FloatArray
+    grid: OccupancyGrid, places: FloatArray, angles_rad: FloatArray
 ) -> tuple[IntArray, FloatArray, Mask]:
-    """Return the last free cell of each ray where it ends at a wall, its length, what it is."""
+    """Follow rays from places to where they end; all results have the shape (places, rays).
+
+    Returns:
+        The last free cell of a ray that ends at a wall, else NO_WALL; its length in metres; True
+        where it ends in the unknown.
+    """
     # No step is longer than a cell, so that no ray passes a wall between two of them.
     steps_m = np.arange(0.0, SIGHT_M, grid.resolution_m * 0.9)
     rays = cast_rays(
         grid.cells.shape,
-        grid.fractional_cells_at(np.array([[place.x, place.y]])),
+        grid.fractional_cells_at(places),
         angles_rad=angles_rad - grid.origin.yaw_rad,
         steps=steps_m / grid.resolution_m,
     )
-    cells = rays.cells[0]
-    n_free = rays.follow(grid.free)[0].sum(axis=1)
-    beams = np.arange(len(angles_rad))
-    end = np.minimum(n_free, steps_m.size - 1)
-    has_end, is_inside = n_free < steps_m.size, rays.is_inside[0][beams, end]
-    at_wall = has_end & (n_free > 0) & is_inside & grid.occupied.ravel()[cells[beams, end]]
-    before = cells[beams, np.maximum(n_free - 1, 0)]
-    return np.where(at_wall, before, NO_WALL), steps_m[end], has_end & ~at_wall
+    n_free = rays.follow(grid.free).sum(axis=2)
+    has_end = n_free < steps_m.size
+    end = np.minimum(n_free, steps_m.size - 1)[..., None]
+    before = np.maximum(n_free - 1, 0)[..., None]
+    is_inside = np.take_along_axis(rays.is_inside, end, axis=2)[..., 0]
+    met = np.take_along_axis(rays.cells, end, axis=2)[..., 0]
+    at_wall = has_end & (n_free > 0) & is_inside & grid.occupied.ravel()[met]
+    walls = np.take_along_axis(rays.cells, before, axis=2)[..., 0]
+    return np.where(at_wall, walls, NO_WALL), steps_m[end[..., 0]], has_end & ~at_wall

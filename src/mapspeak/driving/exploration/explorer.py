@@ -1,10 +1,16 @@
 """The exploration loop: look at the map, choose a frontier, drive, and think again on the way."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
+from mapspeak.driving.exploration.camera import (
+    find_camera_target,
+    is_view_due,
+    measure_pictured_on,
+)
+from mapspeak.driving.exploration.picturing import PictureContext
 from mapspeak.driving.exploration.progress import (
     BoundKind,
     Bounds,
@@ -19,7 +25,6 @@ from mapspeak.driving.exploration.progress import (
 from mapspeak.driving.exploration.trips import (
     SLACK_S,
     Target,
-    TripContext,
     Trips,
     TripState,
 )
@@ -38,6 +43,7 @@ PAUSE_M = 3.0
 BESIDE_M = 1.5
 """A border with the unknown that is this near to a blocked place is what was to be seen there."""
 
+Look = Callable[[], Awaitable[object]]
 Pick = Callable[[Sequence[Frontier], WorldModel], Frontier]
 """Chooses one of several frontiers, which come best first."""
 
@@ -52,10 +58,14 @@ class Explorer:
 
     Args:
         pick: Chooses among frontiers; the first of the ranking unless told otherwise.
+        look: Takes a picture, for explorations that the camera is to see all of.
     """
 
-    def __init__(self, site: TripContext, *, pick: Pick = take_first) -> None:
+    def __init__(
+        self, site: PictureContext, *, pick: Pick = take_first, look: Look | None = None
+    ) -> None:
         self._site = site
+        self._look = look
         self._pick = pick
         self._trips = Trips(site)
         self._state = ExplorationState.NOTHING_KNOWN
@@ -94,6 +104,7 @@ class Explorer:
         while True:
             with self._site.drives.preparing() as ticket:
                 world = await self._site.fetch_world_model()
+                await self._look_on_the_way(world)
                 if (bound := self._bound_reached(world)) is not None:
                     await self._trips.give_up()
                     return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
@@ -107,11 +118,21 @@ class Explorer:
                 state = await self._trips.follow(
                     until_s=begun_s + wait_s, grid=world.grid, on_trip=on_trip
                 )
+            if state is TripState.ARRIVED:
+                await self._take_picture()
             spent_s = self._site.robot.now_s - begun_s
             self._elapsed_s = before_s + spent_s
             ended = self._after(state, is_late=spent_s >= wait_s - SLACK_S)
             if ended is not None:
                 return await self._end(await self._site.fetch_world_model(), ended)
+
+    async def _look_on_the_way(self, world: WorldModel) -> None:
+        if is_view_due(world.robot, self._site.pictures.views):
+            await self._take_picture()
+
+    async def _take_picture(self) -> None:
+        if self._bounds.for_camera and self._look is not None:
+            await self._look()
 
     def _after(self, state: TripState, *, is_late: bool) -> ExplorationState | None:
         """Return how the call ends after a step of a trip; None where it goes on."""
@@ -151,13 +172,18 @@ class Explorer:
 
     def _find_target(self, world: WorldModel) -> Target | None:
         """Return the next frontier; where none is left, a place that was blocked before."""
-        frontiers = [
-            each
-            for each in world.frontiers.frontiers
-            if not self._trips.blocked.is_closed(each.pose.point, world.grid)
-        ]
-        if frontiers:
-            frontier = self._pick(frontiers, world)
+
+        def is_closed(point: Point) -> bool:
+            return self._trips.blocked.is_closed(point, world.grid)
+
+        frontiers = [each for each in world.frontiers.frontiers if not is_closed(each.pose.point)]
+        frontier = self._pick(frontiers, world) if frontiers else None
+        if self._bounds.for_camera:
+            views = self._site.pictures.views
+            target = find_camera_target(world, views, frontier, is_closed=is_closed)
+            if target is not None:
+                return target
+        if frontier is not None:
             return Target(id=frontier.id, pose=frontier.pose, frontier=frontier)
         retry = self._trips.blocked.worth_another_try(world.grid)
         nearest = min(retry, key=lambda each: _path_m(world, each), default=None)
@@ -241,7 +267,12 @@ class Explorer:
             blocked=self._blocked(world),
             not_worth=find_not_worth(world),
             closed=tuple(world.map.areas),
+            pictured_ratio=self._measure_pictured(world),
         )
+
+    def _measure_pictured(self, world: WorldModel) -> float | None:
+        views = self._site.pictures.views
+        return measure_pictured_on(world, views) if self._bounds.for_camera else None
 
 
 def _path_m(world: WorldModel, place: BlockedPlace) -> float:

@@ -56,6 +56,7 @@ class Bounds:
     Attributes:
         duration_s: So much robot time in calls.
         known_ratio: So much of the floor that is to be expected.
+        for_camera: The camera is to see all walls, not the map alone to be complete.
         stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
             was sent to see, so that somebody can look around.
     """
@@ -64,6 +65,7 @@ class Bounds:
     duration_s: float | None = None
     known_ratio: float | None = None
     stops_at_goals: bool = False
+    for_camera: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -79,6 +81,8 @@ class Progress:
         known_ratio: Of the free floor that is to be expected in all.
         frontiers: Where one could still go, best first.
         pose_doubt: Why it may be elsewhere.
+        pictured_ratio: Of the walls in sight of the floor in reach, the share that pictures show;
+            None where the camera does not matter.
     """
 
     state: ExplorationState
@@ -102,6 +106,7 @@ class Progress:
     blocked: tuple[BlockedPlace, ...]
     not_worth: tuple[RefusedFrontier, ...]
     closed: tuple[ClosedArea, ...]
+    pictured_ratio: float | None = None
 
 
 def known_ratio(world: WorldModel) -> float:

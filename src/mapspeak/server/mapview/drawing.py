@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapspeak.geometry import Point
 from mapspeak.server.text.look import Layer, MapLook, MapView
 from mapspeak.server.text.wording import list_some, say_area
 from mapspeak.spatial import OccupancyGrid
@@ -100,7 +101,10 @@ def draw_world(view: MapView) -> WorldPicture:
         layers=MapLayers(
             regions=_rooms_in(view, has_areas=is_detailed) if Layer.ROOMS in look.layers else None,
             zones=_closed_areas(view),
-            lines=_way_to_first_frontier(world) if look.layers >= WITH_PATH else (),
+            lines=(
+                *_unseen_walls(view),
+                *(_way_to_first_frontier(world) if look.layers >= WITH_PATH else ()),
+            ),
             marks=(
                 *(_door_mark(door, is_way=bool(world.find_crossing(door))) for door in doors),
                 *(_frontiers(view) if Layer.FRONTIERS in look.layers else ()),
@@ -115,6 +119,8 @@ def draw_world(view: MapView) -> WorldPicture:
     parts = [_caption(picture)]
     if look.up_rad != NORTH_UP_RAD:
         parts.append(f"Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot.")
+    if view.unseen is not None:
+        parts.append("Purple lines are walls that no picture shows.")
     if Layer.DOORS in look.layers and not is_detailed:
         parts.append("An overview without doors and areas: zoom in with around and radius_m.")
     return WorldPicture(png=picture.png, caption=" ".join(parts))
@@ -216,6 +222,14 @@ def _way_to_first_frontier(world: WorldModel) -> tuple[Line, ...]:
         return ()
     way = world.distances.way_to(world.frontiers.frontiers[0].pose.point)
     return () if way is None or len(way) < 2 else (Line(points=way, style=LineStyle.DASHED),)
+
+
+def _unseen_walls(view: MapView) -> tuple[Line, ...]:
+    unseen = () if view.unseen is None else view.unseen.lines
+    return tuple(
+        Line(points=tuple(Point(x, y) for x, y in line.tolist()), colour=Colour.PURPLE, width_px=5)
+        for line in unseen
+    )
 
 
 def _caption(picture: MapPicture) -> str:

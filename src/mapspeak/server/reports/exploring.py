@@ -50,6 +50,7 @@ class ExploreAnswer(Report):
     elapsed_s: float = Field(description="robot time of all calls of this exploration")
     known_area_m2: float = Field(description="free floor on the map")
     known_percent: float = Field(description="of the floor that is to be expected")
+    walls_pictured_percent: float | None = Field(description="of those in sight; for the camera")
     frontiers: list[str] = Field(description="ids, best first")
     n_frontiers: int
     next: str = Field(description="the frontier under way, and why it was chosen")
@@ -74,6 +75,7 @@ class ExploreAnswer(Report):
             elapsed_s=round(progress.elapsed_s, 1),
             known_area_m2=round(progress.known_area_m2, 1),
             known_percent=round(100 * progress.known_ratio, 1),
+            walls_pictured_percent=_percent(progress.pictured_ratio),
             frontiers=[frontier.id for frontier in progress.frontiers[:MOST_NAMED]],
             n_frontiers=len(progress.frontiers),
             next=_say_next(progress),
@@ -83,6 +85,10 @@ class ExploreAnswer(Report):
             cannot_reach=_say_rest(progress),
             next_step=lead(NEXT_STEP[progress.state]),
         )
+
+
+def _percent(ratio: float | None) -> float | None:
+    return None if ratio is None else round(100 * ratio, 1)
 
 
 def _say_next(progress: Progress) -> str:

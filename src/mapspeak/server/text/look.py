@@ -8,13 +8,16 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
+from mapspeak.driving.exploration.camera import measure_pictured_on
 from mapspeak.driving.exploration.progress import find_refused
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.spatial.viewing import CameraView, mask_pictured, outline_unpictured
 from mapspeak.worldmodel.closures import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
@@ -44,6 +47,11 @@ class Layer(StrEnum):
     FRONTIERS = "frontiers"
     PLACES = "places"
     PATH = "path"
+    UNSEEN = "unseen"
+    """The walls that no picture shows; only for who asks for them."""
+
+
+USUAL_LAYERS = frozenset(Layer) - {Layer.UNSEEN}
 
 
 class Up(StrEnum):
@@ -64,7 +72,7 @@ class MapLook:
         around: What is in its middle; None without a zoom.
     """
 
-    layers: frozenset[Layer] = frozenset(Layer)
+    layers: frozenset[Layer] = USUAL_LAYERS
     up_rad: float = NORTH_UP_RAD
     zoom: Zoom | None = None
     around: Place | None = None
@@ -120,6 +128,19 @@ class MapPart(Generic[Item]):
         return cls((*items[:half], *between, *items[-half:]), len(items), gap_after=half)
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class UnseenWalls:
+    """The walls that no picture shows.
+
+    Attributes:
+        lines: Along them, each of shape (n, 2), in metres.
+        pictured_ratio: The share that pictures show of the walls in sight of the floor in reach.
+    """
+
+    lines: Sequence[FloatArray]
+    pictured_ratio: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapView:
     """What is to be seen of a world model: picture and text show the same.
@@ -134,6 +155,7 @@ class MapView:
         refused: Borders with the unknown that are not offered, longest first.
         places: Remembered ones, nearest first.
         closed: Areas that are closed to the robot now, in the order of the policy.
+        unseen: Walls that no picture shows; None where nobody asked for them.
     """
 
     world: WorldModel
@@ -145,10 +167,15 @@ class MapView:
     refused: MapPart[RefusedFrontier]
     places: MapPart[RememberedPlace]
     closed: MapPart[ClosedArea]
+    unseen: UnseenWalls | None = None
 
 
-def view_of(world: WorldModel, look: MapLook) -> MapView:
-    """Return what is to be seen of a world model."""
+def view_of(world: WorldModel, look: MapLook, pictures: Sequence[CameraView] = ()) -> MapView:
+    """Return what is to be seen of a world model.
+
+    Args:
+        pictures: Where pictures of this map were taken.
+    """
 
     def path_or_far(point: Point | None) -> float:
         path_m = None if point is None else world.path_m(point)
@@ -182,6 +209,14 @@ def view_of(world: WorldModel, look: MapLook) -> MapView:
         closed=MapPart.first(
             [area for area in world.map.areas if _shows_some(look, area)], MOST_CLOSED
         ),
+        unseen=_find_unseen(world, pictures) if Layer.UNSEEN in look.layers else None,
+    )
+
+
+def _find_unseen(world: WorldModel, pictures: Sequence[CameraView]) -> UnseenWalls:
+    return UnseenWalls(
+        lines=outline_unpictured(world.grid, mask_pictured(world.grid, pictures)),
+        pictured_ratio=measure_pictured_on(world, pictures),
     )
 
 
@@ -220,7 +255,7 @@ def look_at(
     Raises:
         GoalError: There is no such place.
     """
-    chosen = frozenset(Layer if layers is None else layers)
+    chosen = USUAL_LAYERS if layers is None else frozenset(layers)
     up_rad = world.robot.yaw_rad if up is Up.ROBOT else NORTH_UP_RAD
     if around is None and radius_m is None:
         return MapLook(layers=chosen, up_rad=up_rad)

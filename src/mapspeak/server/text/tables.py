@@ -97,6 +97,8 @@ def _summary(view: MapView, told: Told) -> str:
         lines += [say_sizes(world, shown), *_say_reachable(world, shown)]
     if Layer.FRONTIERS in look.layers:
         lines += _say_extremes(view)
+    if view.unseen is not None:
+        lines.append(f"Pictures show {view.unseen.pictured_ratio:.0%} of the walls in sight.")
     if told.is_first:
         lines.append(_say_map(world))
     else:

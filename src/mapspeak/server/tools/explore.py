@@ -2,6 +2,8 @@
 
 import base64
 import dataclasses
+from enum import StrEnum
+from functools import partial
 from typing import Annotated
 
 from mcp.server.mcpserver import Context
@@ -33,6 +35,14 @@ USUAL_DRIVES = 50
 USUAL_DURATION_S = 600.0
 """So far a person's word goes where a call has no bound of its own, in robot time."""
 
+
+class Covered(StrEnum):
+    """What an exploration makes complete."""
+
+    MAP = "map"
+    CAMERA = "camera"
+
+
 NGoals = Annotated[
     int | None, Field(description="end after so many frontiers", ge=1, le=200, strict=True)
 ]
@@ -49,6 +59,9 @@ StopsAtGoals = Annotated[
         description="pause with a camera picture wherever the robot arrives, or has seen from afar "
         "what it was sent to see"
     ),
+]
+Cover = Annotated[
+    Covered, Field(description="what is to be complete: the map, or pictures of all walls as well")
 ]
 Wait = Annotated[
     float,
@@ -80,7 +93,7 @@ class ExploreTools:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._explorer = Explorer(session)
+        self._explorer = Explorer(session, look=partial(look_ahead, session))
         self._searcher = Searcher(session)
 
     @tool(
@@ -96,6 +109,7 @@ class ExploreTools:
         duration_s: Duration = None,
         known_percent: KnownPercent = None,
         stops_at_goals: StopsAtGoals = False,  # noqa: FBT002 - tools are called by name
+        cover: Cover = Covered.MAP,
         wait_s: Wait = 20.0,
     ) -> Annotated[CallToolResult, ExploreAnswer]:
         """Drive the robot from frontier to frontier by itself, until nothing is left to explore.
@@ -109,7 +123,10 @@ class ExploreTools:
             duration_s=duration_s,
             known_ratio=None if known_percent is None else known_percent / 100,
             stops_at_goals=stops_at_goals,
+            for_camera=cover is Covered.CAMERA,
         )
+        if bounds.for_camera:
+            self._require_camera()
         with on_errand(_exploring(n_goals, duration_s)):
             progress = await self._explorer.advance(
                 bounds, wait_s=wait_s, on_trip=tell_progress(context), client=client_of(context)
@@ -168,7 +185,7 @@ class ExploreTools:
     def _require_camera(self) -> None:
         if not self._session.robot.description.has_camera:
             raise LinkError(
-                "This robot has no camera to search with.",
+                "This robot has no camera to look with.",
                 hint="Use explore, and look at the map.",
             )
 

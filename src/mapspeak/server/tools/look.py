@@ -10,7 +10,7 @@ from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
 from mapspeak.server.text.findings import say_moved
-from mapspeak.server.text.look import Layer, MapLook, Up, look_at, view_of
+from mapspeak.server.text.look import Layer, MapLook, MapView, Up, look_at, view_of
 from mapspeak.server.text.tables import list_subjects
 from mapspeak.server.text.told import Told
 from mapspeak.server.tools.asking import find_reader
@@ -18,7 +18,9 @@ from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
-Layers = Annotated[list[Layer] | None, Field(description="what to draw and list; else everything")]
+Layers = Annotated[
+    list[Layer] | None, Field(description="what to draw and list; else all but unseen")
+]
 Around = Annotated[
     str | None,
     Field(description='zoom in on an id, a name, "robot" or "x, y"', max_length=200),
@@ -63,12 +65,13 @@ class LookTools:
         the unknown (F) and remembered places (W) with areas, poses and path distances. Any id is a
         place for the other tools.
         """
-        world = await self._session.fetch_world_model()
-        view = await self._session.compute(
-            lambda: view_of(
-                world, look_at(world, layers=layers, around=around, radius_m=radius_m, up=up)
-            )
-        )
+        world, taken = await self._session.fetch_world_model(), self._session.pictures.views
+
+        def see() -> MapView:
+            look = look_at(world, layers=layers, around=around, radius_m=radius_m, up=up)
+            return view_of(world, look, taken)
+
+        view = await self._session.compute(see)
         client = find_reader(context) if view.look == MapLook() else None
         told = Told(None if full or client is None else self._told.get(client))
         shown = await self._session.compute(lambda: show(view, self._representation, told))

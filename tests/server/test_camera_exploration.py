@@ -1,0 +1,77 @@
+"""Exploring for the camera: until pictures show all walls, not until the map alone is complete."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcp.client import Client
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.geometry import Pose
+from mapspeak.robot import GoalState
+from served import connect, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+TOOLSETS = ("look", "drive", "explore")
+MOST_CALLS = 40
+
+
+async def explore(client: Client, **arguments: str) -> dict[str, Any]:
+    for _ in range(MOST_CALLS):
+        report = report_of(await client.call_tool("explore", arguments))
+        if report["state"] not in ("driving", "at_goal"):
+            return report
+    raise AssertionError("the exploration does not end")
+
+
+async def test_with_a_whole_map_the_camera_still_has_all_walls_to_see(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        for_map = await explore(client)
+        assert for_map["state"] == "nothing_left"
+        assert not robot.goals
+        report = await explore(client, cover="camera")
+    assert report["state"] == "nothing_left"
+    assert report["walls_pictured_percent"] >= 95
+    assert any(goal.x > 3.5 for goal in robot.goals.values())
+
+
+async def test_what_pictures_show_already_is_not_driven_to_again(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await explore(client, cover="camera")
+        n_goals = len(robot.goals)
+        report = await explore(client, cover="camera")
+    assert report["state"] == "nothing_left"
+    assert len(robot.goals) == n_goals
+
+
+async def test_an_exploration_of_the_map_says_nothing_of_pictures(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        report = await explore(client)
+    assert report["walls_pictured_percent"] is None
+
+
+async def test_places_that_cannot_be_driven_to_end_it_and_are_not_tried_for_ever(
+    tmp_path: Path,
+) -> None:
+    class Blocked(FakeRobot):
+        async def send_goal(self, goal: Pose) -> str:
+            goal_id = await super().send_goal(goal)
+            self.end_goal(GoalState.BLOCKED)
+            return goal_id
+
+    robot = Blocked(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        report = await explore(client, cover="camera")
+    assert report["n_blocked"] >= 1
+    assert report["walls_pictured_percent"] < 95
+
+
+async def test_a_robot_without_a_camera_is_told_so(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms(), has_camera=False)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("explore", {"cover": "camera"})
+    assert result.is_error
+    assert "no camera" in text_of(result)
