@@ -17,6 +17,7 @@ from mapspeak.geometry import Pose
 
 if TYPE_CHECKING:
     from mapspeak.safety import Guard
+    from mapspeak.server.mapview.representations import Representation
     from mapspeak.spatial.areagraph import MapAnchor
 
 
@@ -215,3 +216,25 @@ def control_folder(given: Path | None) -> Path:
 def wall_clock() -> datetime:
     """Return the operator's time, with its zone."""
     return datetime.now().astimezone()
+
+
+def split_names(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> tuple[str, ...] | None:
+    """Read names with commas between them."""
+    if value is None:
+        return None
+    return tuple(name.strip() for name in value.split(",") if name.strip())
+
+
+def read_representation(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> "Representation | None":
+    """Read how look_at_map is to show the map."""
+    if value is None:
+        return None
+    from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
+
+    if value not in set(Representation):
+        raise click.BadParameter(f"choose from {', '.join(Representation)}")
+    return Representation(value)

@@ -29,6 +29,8 @@ from mapspeak.cli.options import (
     build_guard,
     data_folder,
     read_pose,
+    read_representation,
+    split_names,
 )
 from mapspeak.cli.robots import (
     RobotChoice,
@@ -38,13 +40,14 @@ from mapspeak.cli.robots import (
     split_files,
     split_memories,
 )
+from mapspeak.cli.viewing import VIEW_OPTION, show_live, watch_calls
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
     from mapspeak.server.app import MapspeakServer
-    from mapspeak.server.calllog import CallLog
+    from mapspeak.server.calllog import CallNoting
     from mapspeak.server.mapview.representations import Representation
     from mapspeak.session import Session
 
@@ -64,6 +67,7 @@ class ServeOptions:
     lease_s: float
     representation: "Representation | None"
     call_log: Path | None
+    view: str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,26 +93,6 @@ class RobotOptions:
     robot_files: tuple[str, ...]
     semantic_maps: tuple[str, ...]
     policies: tuple[str, ...]
-
-
-def _split_names(
-    _context: click.Context, _parameter: click.Parameter, value: str | None
-) -> tuple[str, ...] | None:
-    if value is None:
-        return None
-    return tuple(name.strip() for name in value.split(",") if name.strip())
-
-
-def _read_representation(
-    _context: click.Context, _parameter: click.Parameter, value: str | None
-) -> "Representation | None":
-    if value is None:
-        return None
-    from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
-
-    if value not in set(Representation):
-        raise click.BadParameter(f"choose from {', '.join(Representation)}")
-    return Representation(value)
 
 
 @click.command()
@@ -148,12 +132,12 @@ def _read_representation(
 )
 @click.option(
     "--toolsets",
-    callback=_split_names,
+    callback=split_names,
     default=None,
     help="Groups of tools, comma-separated, in place of look,places,drive,paper; others are "
     "explore, routes, memory and ros. +NAME adds one to these, as in +explore.",
 )
-@click.option("--tools", callback=_split_names, default=None, help="Single tools besides.")
+@click.option("--tools", callback=split_names, default=None, help="Single tools besides.")
 @click.option("--read-only", "is_read_only", is_flag=True, help="No tool that changes anything.")
 @click.option(
     "--memory",
@@ -192,7 +176,7 @@ def _read_representation(
 )
 @click.option(
     "--representation",
-    callback=_read_representation,
+    callback=read_representation,
     metavar="NAME",
     help="For evaluations, how look_at_map shows the map: picture-table (default), table, "
     "picture-rooms, picture-numbers, paper-picture or raw-grid.",
@@ -200,6 +184,7 @@ def _read_representation(
 @click.option(
     "--call-log", type=FILE, help="Note every call and answer here, as JSON lines, with pictures."
 )
+@VIEW_OPTION
 @add_options(GUARD_OPTIONS)
 def serve(
     robots: tuple[str, ...],
@@ -220,6 +205,7 @@ def serve(
     lease_s: float,
     representation: "Representation | None",
     call_log: Path | None,
+    view: str | None,
     policies: tuple[str, ...],
     audit: Path | None,
     control: Path | None,
@@ -249,6 +235,7 @@ def serve(
         lease_s=lease_s,
         representation=representation,
         call_log=call_log,
+        view=view,
     )
     anyio.run(_serve, options)
 
@@ -302,8 +289,10 @@ async def _serve(options: ServeOptions) -> None:
             for name, start in options.robots.items()
         }
         call_log = None if options.call_log is None else CallLog(options.call_log)
+        feeds = watch_calls(sessions, call_log) if options.view is not None else {}
         servers = {
-            name: _build_server(session, options, call_log) for name, session in sessions.items()
+            name: _build_server(session, options, feeds[name].calls if feeds else call_log)
+            for name, session in sessions.items()
         }
         server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
         # What was loaded stays for good: no later collection has to go through it, which would
@@ -315,6 +304,8 @@ async def _serve(options: ServeOptions) -> None:
             for session in sessions.values():
                 tasks.start_soon(session.keep_watch)
             try:
+                if options.view is not None:
+                    await tasks.start(show_live, feeds, options.view)
                 what = ", ".join(start.choice.shown for start in options.robots.values())
                 if options.http is None:
                     _tell_typist(what)
@@ -362,7 +353,7 @@ async def _open_session(
 
 
 def _build_server(
-    session: "Session", options: ServeOptions, call_log: "CallLog | None"
+    session: "Session", options: ServeOptions, call_log: "CallNoting | None"
 ) -> "MapspeakServer":
     from mapspeak.server.app import DEFAULT_TOOLSETS, build_server  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick

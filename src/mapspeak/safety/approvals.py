@@ -149,14 +149,19 @@ class WaitingRoom:
         Raises:
             ConfigError: Nothing waits under that id.
         """
-        waiting = self.list_waiting()
-        if wish_id not in waiting:
-            raise ConfigError(
-                f"Nothing waits for approval under {wish_id!r}.",
-                hint=f"There waits: {', '.join(waiting) or 'nothing'}.",
-            )
+        said = self._require_waiting(wish_id)
         self._file(wish_id, "waiting").rename(self._file(wish_id, "approved"))
-        return waiting[wish_id]
+        return said
+
+    def refuse(self, wish_id: str) -> str:
+        """Take a waiting command off the list and return it in words.
+
+        Raises:
+            ConfigError: Nothing waits under that id.
+        """
+        said = self._require_waiting(wish_id)
+        self._file(wish_id, "waiting").unlink(missing_ok=True)
+        return said
 
     def take_approved(self, wish_id: str) -> bool:
         """Return whether a command was approved; once."""
@@ -165,6 +170,15 @@ class WaitingRoom:
         except OSError:
             return False
         return True
+
+    def _require_waiting(self, wish_id: str) -> str:
+        waiting = self.list_waiting()
+        if wish_id not in waiting:
+            raise ConfigError(
+                f"Nothing waits for approval under {wish_id!r}.",
+                hint=f"There waits: {', '.join(waiting) or 'nothing'}.",
+            )
+        return waiting[wish_id]
 
     def remove(self, wish_id: str) -> None:
         """Forget a command."""

@@ -17,7 +17,7 @@ from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
-from mapspeak.server.calllog import CallLog
+from mapspeak.server.calllog import CallNoting
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.remarks import Remarks
@@ -53,7 +53,7 @@ class MapspeakServer(MCPServer[Any]):
         session: Session,
         *,
         instructions: str,
-        call_log: CallLog | None = None,
+        call_log: CallNoting | None = None,
     ) -> None:
         super().__init__(
             "mapspeak",
@@ -248,7 +248,7 @@ def build_server(
     tools: Iterable[str] = (),
     is_read_only: bool = False,
     representation: Representation = Representation.PICTURE_TABLE,
-    call_log: CallLog | None = None,
+    call_log: CallNoting | None = None,
 ) -> MapspeakServer:
     """Build the server with the chosen tools, always in the same order.
 

@@ -8,10 +8,10 @@ import base64
 import json
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from mcp_types import CallToolResult, ImageContent, TextContent
 
@@ -29,6 +29,14 @@ class CallNote:
 
     answer: CallToolResult | None = None
     error: str = ""
+
+
+class CallNoting(Protocol):
+    """Notes calls, wherever to."""
+
+    def noting(self, tool: str, arguments: dict[str, Any]) -> AbstractContextManager[CallNote]:
+        """Note a call when it has come to its end, however that is."""
+        ...
 
 
 @dataclass(slots=True)

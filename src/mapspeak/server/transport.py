@@ -80,13 +80,13 @@ async def serve_http(
     Raises:
         ConfigError: The address is no HOST:PORT, or it is reachable from outside without a token.
     """
-    host, port = _parse_address(address)
-    if token is None and not _is_loopback(host):
+    host, port = parse_address(address)
+    if token is None and not is_loopback(host):
         raise ConfigError(
             f"{host} can be reached from other machines, and no token is set.",
             hint="Set MAPSPEAK_HTTP_TOKEN, or serve on 127.0.0.1.",
         )
-    security = _security(host, port)
+    security = find_security(host, port)
     # Cancellation is lost with json_response or stateless_http: never use either for a robot.
     app = server.streamable_http_app(transport_security=security, host=host)
     app.add_route(HEALTH, _say_ok)
@@ -96,10 +96,10 @@ async def serve_http(
     config = uvicorn.Config(guarded, log_level="warning")
     for name in HTTP_LOGGERS:
         logging.getLogger(name).addFilter(shorten_disconnect)
-    with _listen(host, port) as listener:
+    with listen(host, port) as listener:
         shown = f"[{host}]" if ":" in host else host
         tell = partial(on_ready, f"http://{shown}:{port}/mcp")
-        await _ReadyServer(config, tell).serve(sockets=[listener])
+        await ReadyServer(config, tell).serve(sockets=[listener])
 
 
 def shorten_disconnect(record: logging.LogRecord) -> bool:
@@ -114,7 +114,7 @@ def shorten_disconnect(record: logging.LogRecord) -> bool:
     return True
 
 
-class _ReadyServer(uvicorn.Server):
+class ReadyServer(uvicorn.Server):
     """Says when it answers."""
 
     def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
@@ -218,8 +218,9 @@ async def _say_where(_request: object) -> PlainTextResponse:
     )
 
 
-def _security(host: str, port: int) -> TransportSecuritySettings:
-    if not _is_loopback(host):
+def find_security(host: str, port: int) -> TransportSecuritySettings:
+    """Return which Host and Origin headers are let through at an address."""
+    if not is_loopback(host):
         # The token is what guards here; the names by which others reach this machine are unknown.
         return TransportSecuritySettings(enable_dns_rebinding_protection=False)
     names = {host, "localhost", "127.0.0.1", "[::1]"}
@@ -230,7 +231,12 @@ def _security(host: str, port: int) -> TransportSecuritySettings:
     )
 
 
-def _parse_address(address: str) -> tuple[str, int]:
+def parse_address(address: str) -> tuple[str, int]:
+    """Return host and port.
+
+    Raises:
+        ConfigError: It is no HOST:PORT.
+    """
     host, _, port = address.rpartition(":")
     host = host.strip("[]") or "127.0.0.1"
     if not port.isdecimal() or not 0 < int(port) < 65536:
@@ -240,7 +246,12 @@ def _parse_address(address: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens there.
+
+    Raises:
+        ConfigError: Another program has it, or this machine does not have that address.
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
@@ -251,7 +262,8 @@ def _listen(host: str, port: int) -> socket.socket:
         ) from error
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Return True for an address that only this machine can reach."""
     if host == "localhost":
         return True
     try:

@@ -211,6 +211,11 @@ class Recollector:
                 self._latest = latest = self._make(memory, grid, latest)
             return latest
 
+    @property
+    def latest(self) -> Recollection | None:
+        """What was made last; makes none anew."""
+        return self._latest
+
     def warm(self, memory: SemanticMap) -> None:
         """Load the model and make the vectors of a memory's texts, so that no question need.
 

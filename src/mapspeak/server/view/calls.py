@@ -1,0 +1,105 @@
+"""The calls of clients as a page shows them: arguments, answers and pictures, the latest few."""
+
+import base64
+import itertools
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from typing import Any
+
+from mcp_types import ImageContent, TextContent
+
+from mapspeak.server.calllog import CallLog, CallNote
+from mapspeak.server.view.document import ViewPart
+
+MOST_CALLS = 100
+MOST_CHARACTERS = 20_000
+"""Of one text; the rest is told to be cut."""
+
+
+class CallView(ViewPart):
+    """A call of a tool, or the beginning of one.
+
+    Attributes:
+        is_over: It has been answered.
+        n_pictures: How many came with it; each is fetched apart.
+    """
+
+    number: int
+    tool: str
+    arguments: dict[str, Any]
+    is_over: bool
+    is_error: bool = False
+    text: str = ""
+    n_pictures: int = 0
+
+
+class CallFeed:
+    """Tells pages of calls while they are noted in a log, if there is one.
+
+    Args:
+        log: Where every call is written as well.
+    """
+
+    def __init__(self, log: CallLog | None = None) -> None:
+        self._log = log
+        self._numbers = itertools.count(1)
+        self._calls: dict[int, CallView] = {}
+        self._pictures: dict[int, deque[ImageContent]] = {}
+        self.tell: Callable[[CallView], None] = lambda _: None
+
+    @property
+    def calls(self) -> tuple[CallView, ...]:
+        """The latest calls, the oldest first."""
+        return tuple(self._calls.values())
+
+    def find_picture(self, number: int, index: int) -> tuple[bytes, str] | None:
+        """Return a picture of a call and its media type; None where it is no longer kept."""
+        pictures = self._pictures.get(number, ())
+        if not 0 <= index < len(pictures):
+            return None
+        return base64.b64decode(pictures[index].data), pictures[index].mime_type
+
+    @contextmanager
+    def noting(self, tool: str, arguments: dict[str, Any]) -> Iterator[CallNote]:
+        """Note a call, when it begins and when it has come to its end."""
+        number = next(self._numbers)
+        begun = CallView(number=number, tool=tool, arguments=arguments, is_over=False)
+        self._keep(begun)
+        own = nullcontext(CallNote(error="It came to no answer."))
+        with self._log.noting(tool, arguments) if self._log else own as note:
+            try:
+                yield note
+            finally:
+                self._keep(self._end(begun, note))
+
+    def _end(self, begun: CallView, note: CallNote) -> CallView:
+        answer = note.answer
+        if answer is None:
+            ended = {"is_over": True, "is_error": True, "text": _cut(note.error)}
+            return begun.model_copy(update=ended)
+        pictures = [part for part in answer.content if isinstance(part, ImageContent)]
+        texts = [part.text for part in answer.content if isinstance(part, TextContent)]
+        self._pictures[begun.number] = deque(pictures)
+        return begun.model_copy(
+            update={
+                "is_over": True,
+                "is_error": bool(answer.is_error),
+                "text": _cut("\n".join(texts)),
+                "n_pictures": len(pictures),
+            }
+        )
+
+    def _keep(self, call: CallView) -> None:
+        self._calls[call.number] = call
+        while len(self._calls) > MOST_CALLS:
+            oldest = next(iter(self._calls))
+            del self._calls[oldest]
+            self._pictures.pop(oldest, None)
+        self.tell(call)
+
+
+def _cut(text: str) -> str:
+    if len(text) <= MOST_CHARACTERS:
+        return text
+    return f"{text[:MOST_CHARACTERS]}\n... {len(text) - MOST_CHARACTERS} characters more"

@@ -1,0 +1,200 @@
+"""What pages are told as it happens: one watch of a robot, however many look."""
+
+import json
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+import anyio
+from anyio.streams.memory import MemoryObjectReceiveStream, MemoryObjectSendStream
+
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.geometry import Pose
+from mapspeak.server.text.drives import say_end
+from mapspeak.server.text.wording import say_pose_doubt
+from mapspeak.server.view.calls import CallFeed, CallView
+from mapspeak.server.view.document import GridView, Overlay, PoseView, ViewPart
+from mapspeak.session import Session
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.model import WorldModel
+
+POSE_S = 0.1
+IDLE_S = 1.0
+MAP_EVERY = 10
+"""The map is looked at after so many poses."""
+MOST_UNREAD = 200
+"""A page that reads no more than that is let go; it comes back when it can."""
+TRAIL_M = 0.25
+MOST_TRAIL = 4000
+
+
+class DriveView(ViewPart):
+    """A drive, as it was heard of last."""
+
+    id: str
+    place: str
+    state: str
+    reason: str
+    goal: PoseView
+    path: list[tuple[float, float]]
+
+
+class RobotView(ViewPart):
+    """The robot as it is now.
+
+    Attributes:
+        doubt: Why it may be elsewhere; empty where it is not.
+        held_by: Who holds it, and why; None where nobody does.
+        waiting: What waits for a person's word, by the id to give it with.
+    """
+
+    pose: PoseView | None
+    age_s: float
+    doubt: str
+    fault: str = ""
+    held_by: str | None = None
+    drive: DriveView | None = None
+    waiting: dict[str, str]
+
+
+class ViewFeed:
+    """Watches one robot for the pages that show it; hardly looks while none does."""
+
+    def __init__(self, session: Session, calls: CallFeed) -> None:
+        self.session = session
+        self.calls = calls
+        self.grid: OccupancyGrid | None = None
+        self._pages: set[MemoryObjectSendStream[bytes]] = set()
+        self._has_page = anyio.Event()
+        self._map: GridView | None = None
+        self._world: WorldModel | None = None
+        self._overlay = Overlay()
+        self._path: tuple[str, list[tuple[float, float]]] = ("", [])
+        self._trail: list[tuple[float, float]] = []
+        self._robot: RobotView | None = None
+        calls.tell = self._tell_call
+
+    @asynccontextmanager
+    async def listen(self) -> AsyncGenerator[MemoryObjectReceiveStream[bytes]]:
+        """Receive all that happens from now on, first how everything stands."""
+        send, receive = anyio.create_memory_object_stream[bytes](MOST_UNREAD)
+        for event in self._first_events():
+            send.send_nowait(event)
+        self._pages.add(send)
+        self._has_page.set()
+        try:
+            yield receive
+        finally:
+            self._pages.discard(send)
+            send.close()
+            receive.close()
+
+    async def watch(self) -> None:
+        """Look at the robot and tell the pages, until cancelled; without pages keep the trail."""
+        n_looks = 0
+        while True:
+            if self._pages and n_looks % MAP_EVERY == 0:
+                await self._look_at_map()
+            await self._look_at_robot()
+            n_looks = n_looks + 1 if self._pages else 0
+            if self._pages:
+                await anyio.sleep(POSE_S)
+                continue
+            with anyio.move_on_after(IDLE_S):
+                await self._has_page.wait()
+            self._has_page = anyio.Event()
+
+    def _first_events(self) -> list[bytes]:
+        events = [_event("calls", [call.model_dump() for call in self.calls.calls])]
+        if self._map is not None:
+            events += [_event("map", self._map.model_dump())]
+        events += [_event("overlay", self._overlay.model_dump()), _event("trail", self._trail)]
+        if self._robot is not None:
+            events += [_event("robot", self._robot.model_dump())]
+        return events
+
+    def _tell(self, event: bytes) -> None:
+        for page in list(self._pages):
+            try:
+                page.send_nowait(event)
+            except (anyio.WouldBlock, anyio.BrokenResourceError, anyio.ClosedResourceError):
+                self._pages.discard(page)
+                page.close()
+
+    def _tell_call(self, call: CallView) -> None:
+        self._tell(_event("call", call.model_dump()))
+
+    async def _look_at_map(self) -> None:
+        """Tell what has changed of the map, and of what the tools have found on it."""
+        try:
+            self.grid = await self.session.robot.fetch_map()
+        except MapspeakError:
+            return
+        grid = self.grid
+        if (shown := await self.session.compute(partial(GridView.of, grid))) != self._map:
+            self._map = shown
+            self._tell(_event("map", shown.model_dump()))
+        world = self.session.world
+        if world is not None:
+            overlay = await self.session.compute(partial(Overlay.of, world))
+            if overlay != self._overlay:
+                self._overlay = overlay
+                self._tell(_event("overlay", overlay.model_dump()))
+
+    async def _look_at_robot(self) -> None:
+        robot, guard = self.session.robot, self.session.guard
+        pose, age_s, doubt, fault = None, 0.0, "", ""
+        try:
+            stamped = await robot.fetch_pose()
+        except LinkError as error:
+            fault = str(error)
+        else:
+            pose, age_s = PoseView.of(stamped.pose), round(robot.now_s - stamped.stamp_s, 1)
+            doubt = say_pose_doubt(stamped.find_doubt(robot.now_s))
+            self._note_trail(stamped.pose)
+        shown = RobotView(
+            pose=pose,
+            age_s=age_s,
+            doubt=doubt,
+            fault=fault,
+            held_by=None if guard is None else guard.hold.read(),
+            drive=await self._describe_drive(),
+            waiting={} if guard is None else guard.approvals.room.list_waiting(),
+        )
+        if shown != self._robot:
+            self._robot = shown
+            self._tell(_event("robot", shown.model_dump()))
+
+    def _note_trail(self, pose: Pose) -> None:
+        at = (round(pose.x, 2), round(pose.y, 2))
+        last = self._trail[-1] if self._trail else None
+        if last is None or abs(at[0] - last[0]) + abs(at[1] - last[1]) >= TRAIL_M:
+            self._trail.append(at)
+            del self._trail[:-MOST_TRAIL]
+
+    async def _describe_drive(self) -> DriveView | None:
+        drive, world = self.session.drives.latest, self.session.world
+        if drive is None:
+            return None
+        status = drive.final or drive.heard
+        path: list[tuple[float, float]] = []
+        if drive.final is None and world is not None:
+            if self._path[0] != drive.goal_id:
+                goal = drive.goal.point
+                way = await self.session.compute(lambda: world.distances.way_to(goal))
+                self._path = drive.goal_id, [(round(at.x, 2), round(at.y, 2)) for at in way or ()]
+            path = self._path[1]
+        return DriveView(
+            id=drive.goal_id,
+            place=drive.place,
+            state=status.state.value,
+            reason=say_end(status),
+            goal=PoseView.of(drive.goal),
+            path=path,
+        )
+
+
+def _event(kind: str, data: Any) -> bytes:  # noqa: ANN401 - JSON of any shape
+    """Return an event as a page reads it (WHATWG HTML, server-sent events)."""
+    return f"event: {kind}\ndata: {json.dumps(data, separators=(',', ':'))}\n\n".encode()

@@ -1,0 +1,246 @@
+"""The live page's own small web site: files, events, pictures, and a person's commands."""
+
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from http import HTTPStatus
+from importlib import resources
+from importlib.resources.abc import Traversable
+from typing import Any
+
+from pydantic import ValidationError
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from mapspeak.errors import ConfigError, LinkError, MapspeakError
+from mapspeak.server.view.commands import PersonCommands, Target, Wish
+from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.keys import PageKeys
+from mapspeak.server.view.tiles import draw_tile
+
+ONLY = "robot"
+"""What the only robot is called in addresses."""
+TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".png": "image/png"}
+POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+MOST_BYTES = 2_000
+"""Of the body of a command."""
+FREE = frozenset({"stop", "hold", "check"})
+"""Need no key: what makes a robot stand must never wait, and a check moves nothing."""
+KEY = "x-mapspeak-key"
+
+
+def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
+    """Return the site for some robots by their names.
+
+    Raises:
+        ConfigError: Leaflet is not installed.
+    """
+    site = LiveSite(feeds, keys)
+    routes = [
+        Route("/", site.show_page),
+        Route("/page/{file}", site.show_file),
+        Route("/leaflet/{file}", site.show_leaflet),
+        Route("/leaflet/images/{file}", site.show_leaflet_image),
+        Route("/robots", site.list_robots),
+        Route("/robots/{robot}/events", site.stream),
+        Route("/robots/{robot}/tiles/{row:int}/{col:int}/{name}.png", site.show_tile),
+        Route("/robots/{robot}/camera", site.show_camera),
+        Route("/robots/{robot}/calls/{number:int}/{index:int}", site.show_picture),
+        Route("/unlock", site.unlock, methods=["POST"]),
+        Route("/robots/{robot}/{command}", site.command, methods=["POST"]),
+    ]
+    return _SafeHeaders(Starlette(routes=routes))
+
+
+def find_leaflet() -> Traversable:
+    """Return the folder of Leaflet's files.
+
+    Raises:
+        ConfigError: It is not installed.
+    """
+    try:
+        return resources.files("xstatic.pkg.leaflet").joinpath("data")
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            "The live page needs Leaflet, which is not installed.",
+            hint="Install the extra view: pip install 'mapspeak[view]'.",
+        ) from error
+
+
+class LiveSite:
+    """Answers the requests of pages."""
+
+    def __init__(self, feeds: Mapping[str, ViewFeed], keys: PageKeys) -> None:
+        self._feeds = {name or ONLY: feed for name, feed in feeds.items()}
+        self._commands = {name: PersonCommands(feed.session) for name, feed in self._feeds.items()}
+        self._keys = keys
+        self._page = resources.files(__package__).joinpath("page")
+        self._leaflet = find_leaflet()
+
+    async def show_page(self, _request: Request) -> Response:
+        """Answer with the page."""
+        return _file(self._page, "index.html")
+
+    async def show_file(self, request: Request) -> Response:
+        """Answer with a file of the page."""
+        return _file(self._page, request.path_params["file"])
+
+    async def show_leaflet(self, request: Request) -> Response:
+        """Answer with a file of Leaflet."""
+        return _file(self._leaflet, request.path_params["file"])
+
+    async def show_leaflet_image(self, request: Request) -> Response:
+        """Answer with a picture of Leaflet."""
+        return _file(self._leaflet.joinpath("images"), request.path_params["file"])
+
+    async def list_robots(self, _request: Request) -> Response:
+        """Answer with the names of the robots."""
+        return JSONResponse(list(self._feeds))
+
+    async def stream(self, request: Request) -> Response:
+        """Tell a page what happens, until it leaves."""
+        feed = self._find(request)
+
+        async def events() -> AsyncIterator[bytes]:
+            async with feed.listen() as heard:
+                async for event in heard:
+                    yield event
+
+        return StreamingResponse(
+            events(), media_type="text/event-stream", headers={"cache-control": "no-store"}
+        )
+
+    async def show_tile(self, request: Request) -> Response:
+        """Answer with a tile of the map; its name says what it shows, so it may be kept."""
+        feed, grid = self._find(request), self._find(request).grid
+        row, col = request.path_params["row"], request.path_params["col"]
+        if grid is None:
+            raise HTTPException(HTTPStatus.NOT_FOUND)
+        png = await feed.session.compute(lambda: draw_tile(grid, row, col))
+        kept = {"cache-control": "private, max-age=3600, immutable"}
+        return Response(png, media_type="image/png", headers=kept)
+
+    async def show_camera(self, request: Request) -> Response:
+        """Answer with what the camera sees now."""
+        robot = self._find(request).session.robot
+        if not robot.description.has_camera:
+            raise HTTPException(HTTPStatus.NOT_FOUND, "This robot has no camera.")
+        try:
+            picture = await robot.fetch_picture()
+        except LinkError as error:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+        fresh = {"cache-control": "no-store"}
+        return Response(picture.data, media_type=picture.media_type, headers=fresh)
+
+    async def show_picture(self, request: Request) -> Response:
+        """Answer with a picture that a client was given."""
+        numbers = request.path_params["number"], request.path_params["index"]
+        found = self._find(request).calls.find_picture(*numbers)
+        if found is None:
+            raise HTTPException(HTTPStatus.NOT_FOUND, "That picture is no longer kept.")
+        return Response(found[0], media_type=found[1])
+
+    async def unlock(self, request: Request) -> Response:
+        """Give a key for the token that the server's terminal shows."""
+        token = await _read_body(request)
+        key = self._keys.unlock(str(token.get("token", "")))
+        if key is None:
+            return _say("That is not the token. A newer one may stand on the terminal.", 403)
+        return JSONResponse({"key": key})
+
+    async def command(self, request: Request) -> Response:
+        """Carry out a person's command, and say what came of it."""
+        self._find(request)
+        name = request.path_params["command"]
+        commands = self._commands[request.path_params["robot"]]
+        if name not in FREE and not self._keys.is_known(request.headers.get(KEY, "")):
+            return _say("Unlock the page first, with the token on the server's terminal.", 403)
+        try:
+            said = await self._carry_out(name, commands, await _read_body(request))
+        except ValidationError as error:
+            return _say(f"Not understood: {error.errors(include_url=False)[0]['msg']}.", 422)
+        except MapspeakError as error:
+            return _say(str(error), 409)
+        return _say(said, 200)
+
+    async def _carry_out(self, name: str, commands: PersonCommands, body: dict[str, Any]) -> str:
+        plain: dict[str, Callable[[], Awaitable[str]]] = {
+            "stop": commands.stop,
+            "hold": commands.hold,
+            "release": commands.release,
+        }
+        if name in plain:
+            return await plain[name]()
+        match name:
+            case "check":
+                return await commands.check(Target.model_validate(body))
+            case "drive":
+                return await commands.drive(Target.model_validate(body))
+            case "approve":
+                return await commands.approve(Wish.model_validate(body))
+            case "refuse":
+                return await commands.refuse(Wish.model_validate(body))
+        raise HTTPException(HTTPStatus.NOT_FOUND)
+
+    def _find(self, request: Request) -> ViewFeed:
+        feed = self._feeds.get(request.path_params["robot"])
+        if feed is None:
+            raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such robot.")
+        return feed
+
+
+def _file(folder: Traversable, name: str) -> Response:
+    suffix = name[name.rfind(".") :]
+    path = folder.joinpath(name)
+    if suffix not in TYPES or "/" in name or not path.is_file():
+        raise HTTPException(HTTPStatus.NOT_FOUND)
+    return Response(path.read_bytes(), media_type=TYPES[suffix])
+
+
+async def _read_body(request: Request) -> dict[str, Any]:
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > MOST_BYTES:
+            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+    try:
+        read = json.loads(body or b"{}")
+    except ValueError:
+        read = None
+    if not isinstance(read, dict):
+        raise HTTPException(HTTPStatus.BAD_REQUEST, "Not a JSON object.")
+    return read
+
+
+def _say(text: str, status: int) -> Response:
+    return PlainTextResponse(text, status)
+
+
+class _SafeHeaders:
+    """Lets no other page hold, frame or run anything of this one."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, and add to the answer's headers."""
+
+        async def send_safely(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message["headers"], *HEADERS]}
+            await send(message)
+
+        await self._app(scope, receive, send_safely)
