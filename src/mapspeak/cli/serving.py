@@ -61,13 +61,20 @@ class ServeOptions:
 
     robots: Mapping[str, "RobotStart"]
     http: str | None
-    toolsets: tuple[str, ...] | None
-    tools: tuple[str, ...]
-    is_read_only: bool
+    tools: "ToolChoice"
     lease_s: float
     representation: "Representation | None"
     call_log: Path | None
     view: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class ToolChoice:
+    """Which tools are offered: groups and single ones, as they were named."""
+
+    sets: tuple[str, ...]
+    single: tuple[str, ...]
+    is_read_only: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,9 +236,7 @@ def serve(
     options = ServeOptions(
         robots=starts,
         http=http,
-        toolsets=toolsets,
-        tools=tools or (),
-        is_read_only=is_read_only,
+        tools=ToolChoice(toolsets or (), tools or (), is_read_only),
         lease_s=lease_s,
         representation=representation,
         call_log=call_log,
@@ -359,16 +364,16 @@ def _build_server(
     from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.tools.ros.inquiry import require_ros  # noqa: PLC0415
 
-    named = options.toolsets or ()
-    added = tuple(name.removeprefix("+") for name in named if name.startswith("+"))
-    others = tuple(name for name in named if not name.startswith("+"))
+    chosen = options.tools
+    added = tuple(name.removeprefix("+") for name in chosen.sets if name.startswith("+"))
+    others = tuple(name for name in chosen.sets if not name.startswith("+"))
     toolsets = (*(others or DEFAULT_TOOLSETS), *added)
-    require_ros(session, toolsets=toolsets, tools=options.tools)
+    require_ros(session, toolsets=toolsets, tools=chosen.single)
     return build_server(
         session,
         toolsets=toolsets,
-        tools=options.tools,
-        is_read_only=options.is_read_only,
+        tools=chosen.single,
+        is_read_only=chosen.is_read_only,
         representation=options.representation or Representation.PICTURE_TABLE,
         call_log=call_log,
     )

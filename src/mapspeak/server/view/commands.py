@@ -16,7 +16,7 @@ PERSON = "a person at the live page"
 Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
-class Target(BaseModel):
+class MapTarget(BaseModel):
     """A point of the map, in metres."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -63,7 +63,7 @@ class PersonCommands:
         """Take a command that waits off the list."""
         return f"Refused: {self._require_guard().approvals.room.refuse(wish.id)}."
 
-    async def check(self, target: Target) -> str:
+    async def check(self, target: MapTarget) -> str:
         """Say whether the robot can drive to a point."""
         world = await self._session.fetch_world_model()
         place = _place_at(target)
@@ -72,7 +72,7 @@ class PersonCommands:
         instead = "" if near is None else f" The nearest that works is {say_spot(near.point)}."
         return f"{say_check(goal.check)}{instead}"
 
-    async def drive(self, target: Target) -> str:
+    async def drive(self, target: MapTarget) -> str:
         """Send the robot to a point."""
         session = self._session
         person = Caller(client=PERSON, tool="live page")
@@ -90,6 +90,6 @@ class PersonCommands:
         return guard
 
 
-def _place_at(target: Target) -> Place:
+def _place_at(target: MapTarget) -> Place:
     point = Point(target.x, target.y)
     return Place(say_spot(point), Spot(point))

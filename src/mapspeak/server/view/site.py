@@ -16,10 +16,10 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mapspeak.errors import ConfigError, LinkError, MapspeakError
-from mapspeak.server.view.commands import PersonCommands, Target, Wish
+from mapspeak.server.view.commands import MapTarget, PersonCommands, Wish
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import PageKeys
-from mapspeak.server.view.tiles import draw_tile
+from mapspeak.server.view.tiles import draw_tile, has_tile
 
 ONLY = "robot"
 """What the only robot is called in addresses."""
@@ -127,7 +127,7 @@ class LiveSite:
         """Answer with a tile of the map; its name says what it shows, so it may be kept."""
         feed, grid = self._find(request), self._find(request).grid
         row, col = request.path_params["row"], request.path_params["col"]
-        if grid is None:
+        if grid is None or not has_tile(grid, row, col):
             raise HTTPException(HTTPStatus.NOT_FOUND)
         png = await feed.session.compute(lambda: draw_tile(grid, row, col))
         kept = {"cache-control": "private, max-age=3600, immutable"}
@@ -186,9 +186,9 @@ class LiveSite:
             return await plain[name]()
         match name:
             case "check":
-                return await commands.check(Target.model_validate(body))
+                return await commands.check(MapTarget.model_validate(body))
             case "drive":
-                return await commands.drive(Target.model_validate(body))
+                return await commands.drive(MapTarget.model_validate(body))
             case "approve":
                 return await commands.approve(Wish.model_validate(body))
             case "refuse":

@@ -1,0 +1,403 @@
+"""The live page: what a browser is told, and what a person may do from it."""
+
+import io
+import json
+import socket
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import anyio
+import httpx2
+import numpy as np
+import pytest
+from mcp.client import Client
+from PIL import Image
+
+from fakes import FakeRobot, two_rooms
+from guarding import audit_of, make_guard
+from mapspeak.errors import ConfigError, LinkError
+from mapspeak.memory import SemanticMapStore
+from mapspeak.robot import StampedPose
+from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy
+from mapspeak.server.app import build_server
+from mapspeak.server.view.calls import CallFeed
+from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.serving import serve_view
+from mapspeak.session import Session
+
+pytestmark = pytest.mark.anyio
+
+PATIENCE_S = 20.0
+HOSTILE = "<script>alert(1)</script> \u202e fire \x07"
+
+
+@dataclass
+class Live:
+    """A live page that is served, and the client whose robot it shows."""
+
+    http: httpx2.AsyncClient
+    client: Client
+    session: Session
+    robot: FakeRobot
+    tokens: list[str]
+    keys: dict[str, str] = field(default_factory=dict)
+
+    async def command(self, name: str, **body: object) -> httpx2.Response:
+        return await self.http.post(f"/robots/robot/{name}", json=body, headers=self.keys)
+
+    async def unlock(self) -> None:
+        answer = await self.http.post("/unlock", json={"token": self.tokens[-1]})
+        self.keys = {"x-mapspeak-key": answer.json()["key"]}
+
+    @asynccontextmanager
+    async def hear(self) -> AsyncGenerator[AsyncIterator[tuple[str, Any]]]:
+        async with self.http.stream("GET", "/robots/robot/events") as answer:
+            yield _read_events(answer)
+
+    async def wait_for(self, kind: str, having: str = "") -> Any:  # noqa: ANN401 - JSON
+        """Return what is told first of a kind, or first with something in a field."""
+        async with self.hear() as events:
+            data = await next_of(events, kind)
+            while having and not data[having]:
+                data = await next_of(events, kind)
+            return data
+
+
+async def _read_events(answer: httpx2.Response) -> AsyncIterator[tuple[str, Any]]:
+    kind = ""
+    async for line in answer.aiter_lines():
+        name, _, rest = line.partition(": ")
+        if name == "event":
+            kind = rest
+        elif name == "data":
+            yield kind, json.loads(rest)
+
+
+async def next_of(events: AsyncIterator[tuple[str, Any]], kind: str) -> Any:  # noqa: ANN401 - JSON
+    async for heard, data in events:
+        if heard == kind:
+            return data
+    raise AssertionError(f"the events ended before {kind}")
+
+
+@asynccontextmanager
+async def serve_live(
+    folder: Path, robot: FakeRobot | None = None, *, guard: Guard | None = None
+) -> AsyncGenerator[Live]:
+    """Serve a robot to a client, and its live page."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    robot = robot or FakeRobot(two_rooms())
+    guard = guard or make_guard(folder)
+    store = SemanticMapStore(folder / "m.yaml", map_id="two-rooms")
+    session = Session(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
+    calls, tokens, is_ready = CallFeed(), list[str](), anyio.Event()
+    feeds = {"": ViewFeed(session, calls)}
+    with anyio.fail_after(PATIENCE_S):
+        async with (
+            anyio.create_task_group() as tasks,
+            Client(build_server(session, call_log=calls)) as client,
+            httpx2.AsyncClient(base_url=f"http://{address}", timeout=PATIENCE_S) as http,
+        ):
+
+            async def serve() -> None:
+                def tell(_address: str) -> None:
+                    is_ready.set()
+
+                await serve_view(feeds, address, tell_token=tokens.append, on_ready=tell)
+
+            tasks.start_soon(serve)
+            await is_ready.wait()
+            yield Live(http, client, session, robot, tokens)
+            tasks.cancel_scope.cancel()
+
+
+# --- what a page is told ---------------------------------------------------------------------
+
+
+async def test_a_page_is_told_first_how_everything_stands(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.client.call_tool("look_at_map", {})
+        calls, grid = await live.wait_for("calls"), await live.wait_for("map")
+        overlay, robot = await live.wait_for("overlay", "doors"), await live.wait_for("robot")
+    assert [call["tool"] for call in calls] == ["look_at_map"]
+    assert (grid["n_rows"], grid["n_cols"], grid["resolution_m"]) == (11, 30, 0.25)
+    assert {region["id"] for region in overlay["regions"]} == {"R1", "R2"}
+    assert [door["id"] for door in overlay["doors"]] == ["D1"]
+    assert robot["pose"] == {"x": 1.5, "y": 1.4, "yaw_deg": 0.0}
+
+
+async def test_the_tiles_show_the_map_with_its_upper_edge_on_top(tmp_path: Path) -> None:
+    grid = two_rooms()
+    async with serve_live(tmp_path) as live:
+        (name,) = (await live.wait_for("map"))["tiles"][0]
+        png = (await live.http.get(f"/robots/robot/tiles/0/0/{name}.png")).content
+    grey = np.asarray(Image.open(io.BytesIO(png)).convert("L"))
+    assert grey.shape == grid.cells.shape
+    assert ((grey == 0) == grid.occupied[::-1]).all()
+
+
+async def test_of_a_map_that_grows_only_the_tiles_that_changed_have_new_names(
+    tmp_path: Path,
+) -> None:
+    cells = np.full((600, 600), -1, dtype=np.int8)
+    cells[:250, :] = 0
+    big = type(two_rooms())(cells=cells, resolution_m=0.05, origin=two_rooms().origin)
+    grown = cells.copy()
+    grown[300:310, 20:40] = 100
+    robot = FakeRobot(big)
+    async with serve_live(tmp_path, robot) as live, live.hear() as events:
+        before = (await next_of(events, "map"))["tiles"]
+        robot.grid = type(big)(cells=grown, resolution_m=0.05, origin=big.origin)
+        after = (await next_of(events, "map"))["tiles"]
+    changed = [(r, c) for r in range(3) for c in range(3) if before[r][c] != after[r][c]]
+    assert changed == [(1, 0)]
+    assert before[2] == ["", "", ""]
+
+
+async def test_a_call_is_told_when_it_begins_and_with_its_answer_and_pictures(
+    tmp_path: Path,
+) -> None:
+    async with serve_live(tmp_path) as live, live.hear() as events:
+        await next_of(events, "robot")
+        result = await live.client.call_tool("look_through_camera", {})
+        begun, ended = await next_of(events, "call"), await next_of(events, "call")
+        picture = await live.http.get("/robots/robot/calls/1/0")
+        missing = await live.http.get("/robots/robot/calls/1/1")
+    assert (begun["is_over"], ended["is_over"], ended["is_error"]) == (False, True, False)
+    assert ended["text"] in str(result.content)
+    assert ended["n_pictures"] == 1
+    assert picture.headers["content-type"] == "image/jpeg"
+    assert missing.status_code == 404
+
+
+async def test_a_refused_call_is_told_as_refused(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.client.call_tool("navigate_to", {"place": "R77"})
+        (call,) = await live.wait_for("calls")
+    assert call["is_error"]
+    assert "There is no place called 'R77'" in call["text"]
+
+
+async def test_a_drive_is_told_with_its_way(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, live.hear() as events:
+        await live.client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        drive = None
+        while not drive or not drive["path"]:
+            drive = (await next_of(events, "robot"))["drive"]
+    assert (drive["id"], drive["place"]) == ("G1", "R2")
+    assert drive["path"][0] == [pytest.approx(1.5, abs=0.3), pytest.approx(1.4, abs=0.3)]
+
+
+async def test_a_robot_without_a_map_yet_is_shown_by_its_pose(tmp_path: Path) -> None:
+    async with serve_live(tmp_path, FakeRobot(None)) as live:
+        assert (await live.wait_for("robot", "pose"))["pose"]["x"] == 1.5
+
+
+async def test_a_robot_that_is_lost_is_told_with_why(tmp_path: Path) -> None:
+    class Lost(FakeRobot):
+        async def fetch_pose(self) -> StampedPose:
+            raise LinkError("The robot does not answer.", hint="Look at its network.")
+
+    async with serve_live(tmp_path, Lost(two_rooms())) as live:
+        assert "does not answer" in (await live.wait_for("robot", "fault"))["fault"]
+
+
+async def test_the_camera_is_shown_where_there_is_one(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with serve_live(tmp_path, robot) as live:
+        assert (await live.http.get("/robots/robot/camera")).status_code == 200
+        robot.has_camera = False
+        assert (await live.http.get("/robots/robot/camera")).status_code == 404
+
+
+# --- what a person may do --------------------------------------------------------------------
+
+
+async def test_a_stop_needs_no_key(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        said = await live.command("stop")
+    assert said.status_code == 200
+    assert live.robot.n_stops == 1
+    assert live.session.drives.under_way is None
+
+
+async def test_a_hold_needs_no_key_and_a_release_does(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        assert (await live.command("hold")).status_code == 200
+        refused = await live.client.call_tool("navigate_to", {"place": "R2"})
+        assert refused.is_error
+        assert "live page" in (await live.wait_for("robot", "held_by"))["held_by"]
+        assert (await live.command("release")).status_code == 403
+        await live.unlock()
+        assert (await live.command("release")).text == "Released."
+        driven = await live.client.call_tool("navigate_to", {"place": "R2"})
+    assert not driven.is_error
+
+
+async def test_a_person_with_the_token_drives_and_the_log_says_who(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        assert (await live.command("drive", x=3.0, y=1.0)).status_code == 403
+        assert not live.robot.goals
+        await live.unlock()
+        assert (await live.command("drive", x=3.0, y=1.0)).status_code == 200
+        (goal,) = live.robot.goals.values()
+    assert (goal.x, goal.y) == (3.0, 1.0)
+    assert {line.client for line in audit_of(tmp_path)} == {"a person at the live page"}
+
+
+async def test_a_click_into_a_wall_is_answered_with_why_and_with_what_works(
+    tmp_path: Path,
+) -> None:
+    async with serve_live(tmp_path) as live:
+        checked = await live.command("check", x=3.4, y=2.4)
+        await live.unlock()
+        driven = await live.command("drive", x=3.4, y=2.4)
+    assert "lies in a wall" in checked.text
+    assert "The nearest that works is" in checked.text
+    assert driven.status_code == 409
+    assert not live.robot.goals
+
+
+async def test_a_waiting_command_is_shown_and_approved_once(tmp_path: Path) -> None:
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
+    guard = make_guard(tmp_path, Policy(approval=approval))
+    async with serve_live(tmp_path, guard=guard) as live:
+        await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+        ((wish, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
+        assert (await live.command("approve", id=wish)).status_code == 403
+        await live.unlock()
+        assert "Approved: drive to" in (await live.command("approve", id=wish)).text
+        assert (await live.command("approve", id=wish)).status_code == 409
+        driven = await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+    assert not driven.is_error
+    assert len(live.robot.goals) == 1
+
+
+async def test_a_refused_command_no_longer_waits(tmp_path: Path) -> None:
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
+    guard = make_guard(tmp_path, Policy(approval=approval))
+    async with serve_live(tmp_path, guard=guard) as live:
+        await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+        ((wish, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
+        await live.unlock()
+        assert "Refused: drive to" in (await live.command("refuse", id=wish)).text
+        assert not guard.approvals.room.list_waiting()
+        again = await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+    assert again.is_error
+    assert not live.robot.goals
+
+
+# --- who must be kept out --------------------------------------------------------------------
+
+
+async def test_a_token_is_good_once(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        first = live.tokens[-1]
+        await live.unlock()
+        again = await live.http.post("/unlock", json={"token": first})
+    assert again.status_code == 403
+    assert len(live.tokens) == 2
+
+
+async def test_who_guesses_tokens_is_not_heard_any_more(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        for guess in range(20):
+            await live.http.post("/unlock", json={"token": f"{guess:08d}"})
+        answer = await live.http.post("/unlock", json={"token": live.tokens[-1]})
+    assert answer.status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"origin": "http://elsewhere.example"}, 403),
+        ({"host": "rebound.example"}, 421),
+    ],
+)
+async def test_pages_of_others_command_nothing_not_even_a_stop(
+    tmp_path: Path, headers: dict[str, str], status: int
+) -> None:
+    async with serve_live(tmp_path) as live:
+        answer = await live.http.post("/robots/robot/stop", json={}, headers=headers)
+    assert answer.status_code == status
+    assert live.robot.n_stops == 0
+
+
+async def test_no_other_page_frames_this_one_and_no_foreign_script_runs_in_it(
+    tmp_path: Path,
+) -> None:
+    async with serve_live(tmp_path) as live:
+        page = await live.http.get("/")
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'self'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert page.headers["x-content-type-options"] == "nosniff"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/page/..%2f..%2fapp.py",
+        "/page/../site.py",
+        "/leaflet/..%2f__init__.py",
+        "/page/nothing.js",
+        "/robots/other/events",
+        "/robots/robot/tiles/0/99/x.png",
+    ],
+)
+async def test_only_the_files_of_the_page_are_given_out(tmp_path: Path, path: str) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.wait_for("map")
+        assert (await live.http.get(path)).status_code == 404
+
+
+@pytest.mark.parametrize("body", [b"[]", b"{", b"x" * 5000])
+async def test_a_body_that_is_no_command_is_refused(tmp_path: Path, body: bytes) -> None:
+    async with serve_live(tmp_path) as live:
+        json_type = {"content-type": "application/json"}
+        answer = await live.http.post("/robots/robot/check", content=body, headers=json_type)
+    assert answer.status_code in (400, 413)
+
+
+@pytest.mark.parametrize("x", ["here", None, 1e300])
+async def test_a_place_that_is_no_place_is_refused(tmp_path: Path, x: object) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.unlock()
+        answer = await live.command("drive", x=x, y=0.0)
+    assert answer.status_code == 422
+    assert not live.robot.goals
+
+
+async def test_hostile_names_come_as_data(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        noted = {"name": HOSTILE, "description": HOSTILE}
+        await live.client.call_tool("write_semantic_data", noted)
+        await live.client.call_tool("look_at_map", {})
+        overlay = await live.wait_for("overlay", "places")
+        page = (await live.http.get("/page/map.js")).text
+    assert "<script>" in overlay["places"][0]["name"]
+    assert "textContent" in page
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0:8767", "192.0.2.7:80", "[::]:8767"])
+async def test_the_page_is_for_this_machine_alone(address: str) -> None:
+    with pytest.raises(ConfigError, match="SSH tunnel"):
+        await serve_view({}, address, tell_token=lambda _: None)
+
+
+async def test_a_page_that_reads_nothing_costs_the_others_nothing(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, live.hear(), live.hear() as events:
+        for _ in range(400):
+            await live.client.call_tool("get_robot_pose", {})
+        numbers = [(await next_of(events, "call"))["number"] for _ in range(400)]
+    assert max(numbers) >= 200
+
+
+def test_the_viewer_is_small() -> None:
+    page = Path(__file__).parents[2] / "src" / "mapspeak" / "server" / "view" / "page"
+    assert sum(file.stat().st_size for file in page.iterdir()) <= 120_000
