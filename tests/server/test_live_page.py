@@ -1,118 +1,23 @@
 """The live page: what a browser is told, and what a person may do from it."""
 
 import io
-import json
-import socket
-from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-import anyio
-import httpx2
 import numpy as np
 import pytest
-from mcp.client import Client
 from PIL import Image
 
 from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
+from livepage import next_of, serve_live
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import StampedPose
-from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy
-from mapspeak.server.app import build_server
-from mapspeak.server.view.calls import CallFeed
-from mapspeak.server.view.feed import ViewFeed
+from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.server.view.serving import serve_view
-from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
 
-PATIENCE_S = 20.0
 HOSTILE = "<script>alert(1)</script> \u202e fire \x07"
-
-
-@dataclass
-class Live:
-    """A live page that is served, and the client whose robot it shows."""
-
-    http: httpx2.AsyncClient
-    client: Client
-    session: Session
-    robot: FakeRobot
-    tokens: list[str]
-    keys: dict[str, str] = field(default_factory=dict)
-
-    async def command(self, name: str, **body: object) -> httpx2.Response:
-        return await self.http.post(f"/robots/robot/{name}", json=body, headers=self.keys)
-
-    async def unlock(self) -> None:
-        answer = await self.http.post("/unlock", json={"token": self.tokens[-1]})
-        self.keys = {"x-mapspeak-key": answer.json()["key"]}
-
-    @asynccontextmanager
-    async def hear(self) -> AsyncGenerator[AsyncIterator[tuple[str, Any]]]:
-        async with self.http.stream("GET", "/robots/robot/events") as answer:
-            yield _read_events(answer)
-
-    async def wait_for(self, kind: str, having: str = "") -> Any:  # noqa: ANN401 - JSON
-        """Return what is told first of a kind, or first with something in a field."""
-        async with self.hear() as events:
-            data = await next_of(events, kind)
-            while having and not data[having]:
-                data = await next_of(events, kind)
-            return data
-
-
-async def _read_events(answer: httpx2.Response) -> AsyncIterator[tuple[str, Any]]:
-    kind = ""
-    async for line in answer.aiter_lines():
-        name, _, rest = line.partition(": ")
-        if name == "event":
-            kind = rest
-        elif name == "data":
-            yield kind, json.loads(rest)
-
-
-async def next_of(events: AsyncIterator[tuple[str, Any]], kind: str) -> Any:  # noqa: ANN401 - JSON
-    async for heard, data in events:
-        if heard == kind:
-            return data
-    raise AssertionError(f"the events ended before {kind}")
-
-
-@asynccontextmanager
-async def serve_live(
-    folder: Path, robot: FakeRobot | None = None, *, guard: Guard | None = None
-) -> AsyncGenerator[Live]:
-    """Serve a robot to a client, and its live page."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        address = f"127.0.0.1:{free.getsockname()[1]}"
-    robot = robot or FakeRobot(two_rooms())
-    guard = guard or make_guard(folder)
-    store = SemanticMapStore(folder / "m.yaml", map_id="two-rooms")
-    session = Session(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
-    calls, tokens, is_ready = CallFeed(), list[str](), anyio.Event()
-    feeds = {"": ViewFeed(session, calls)}
-    with anyio.fail_after(PATIENCE_S):
-        async with (
-            anyio.create_task_group() as tasks,
-            Client(build_server(session, call_log=calls)) as client,
-            httpx2.AsyncClient(base_url=f"http://{address}", timeout=PATIENCE_S) as http,
-        ):
-
-            async def serve() -> None:
-                def tell(_address: str) -> None:
-                    is_ready.set()
-
-                await serve_view(feeds, address, tell_token=tokens.append, on_ready=tell)
-
-            tasks.start_soon(serve)
-            await is_ready.wait()
-            yield Live(http, client, session, robot, tokens)
-            tasks.cancel_scope.cancel()
 
 
 # --- what a page is told ---------------------------------------------------------------------

@@ -18,7 +18,7 @@ VIEW_OPTION = click.option(
     flag_value=DEFAULT_VIEW,
     metavar="[HOST:PORT]",
     help=f"A live page for a browser on this machine: map, camera, calls, stop, approval; at "
-    f"{DEFAULT_VIEW} unless said otherwise. Needs the extra view.",
+    f"{DEFAULT_VIEW} unless said otherwise.",
 )
 
 

@@ -22,7 +22,7 @@ from mapspeak.worldmodel.model import WorldModel
 POSE_S = 0.1
 IDLE_S = 1.0
 MAP_EVERY = 10
-"""The map is looked at after so many poses."""
+"""After so many poses the map is looked at, and pages hear that the server is there."""
 MOST_UNREAD = 200
 """A page that reads no more than that is let go; it comes back when it can."""
 TRAIL_M = 0.25
@@ -96,6 +96,7 @@ class ViewFeed:
         while True:
             if self._pages and n_looks % MAP_EVERY == 0:
                 await self._look_at_map()
+                self._tell(_event("alive", None))
             await self._look_at_robot()
             n_looks = n_looks + 1 if self._pages else 0
             if self._pages:

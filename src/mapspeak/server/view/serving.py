@@ -37,8 +37,7 @@ async def serve_view(
         on_ready: Called with the page's address once it answers.
 
     Raises:
-        ConfigError: The address is no HOST:PORT of this machine, it is taken, or Leaflet is not
-            installed.
+        ConfigError: The address is no HOST:PORT of this machine, or it is taken.
     """
     host, port = parse_address(address)
     if not is_loopback(host):

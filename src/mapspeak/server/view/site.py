@@ -15,7 +15,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from mapspeak.errors import ConfigError, LinkError, MapspeakError
+from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.server.view.commands import MapTarget, PersonCommands, Wish
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import PageKeys
@@ -43,11 +43,7 @@ KEY = "x-mapspeak-key"
 
 
 def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
-    """Return the site for some robots by their names.
-
-    Raises:
-        ConfigError: Leaflet is not installed.
-    """
+    """Return the site for some robots by their names."""
     site = LiveSite(feeds, keys)
     routes = [
         Route("/", site.show_page),
@@ -65,21 +61,6 @@ def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
     return _SafeHeaders(Starlette(routes=routes))
 
 
-def find_leaflet() -> Traversable:
-    """Return the folder of Leaflet's files.
-
-    Raises:
-        ConfigError: It is not installed.
-    """
-    try:
-        return resources.files("xstatic.pkg.leaflet").joinpath("data")
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            "The live page needs Leaflet, which is not installed.",
-            hint="Install the extra view: pip install 'mapspeak[view]'.",
-        ) from error
-
-
 class LiveSite:
     """Answers the requests of pages."""
 
@@ -88,7 +69,7 @@ class LiveSite:
         self._commands = {name: PersonCommands(feed.session) for name, feed in self._feeds.items()}
         self._keys = keys
         self._page = resources.files(__package__).joinpath("page")
-        self._leaflet = find_leaflet()
+        self._leaflet = resources.files("xstatic.pkg.leaflet").joinpath("data")
 
     async def show_page(self, _request: Request) -> Response:
         """Answer with the page."""

@@ -54,7 +54,8 @@ on("robot", (data) => {
 function showState() {
   const silent_s = (performance.now() - heardAt) / 1000;
   const said = [];
-  if (!isConnected) said.push("The server does not answer; trying again.");
+  const isLost = !isConnected || silent_s > OLD_S;
+  if (isLost) said.push("The server does not answer; trying again.");
   if (latest) {
     const { pose, drive } = latest;
     if (latest.held_by) said.push(`HELD ${latest.held_by}.`);
@@ -64,7 +65,7 @@ function showState() {
     if (drive) said.push(`${drive.id} to ${drive.place}: ${drive.state}. ${drive.reason}`);
     const age_s = latest.age_s + silent_s;
     if (age_s > OLD_S) said.push(`The pose is ${age_s.toFixed(0)} s old.`);
-    find("state").classList.toggle("old", !isConnected || age_s > OLD_S || Boolean(latest.doubt));
+    find("state").classList.toggle("old", isLost || age_s > OLD_S || Boolean(latest.doubt));
   }
   find("state").textContent = said.join(" ") || "Waiting for the robot.";
 }

@@ -1,0 +1,206 @@
+"""The live page in a real browser: every button, hostile names, a phone, and its pictures."""
+
+import os
+import shutil
+import sys
+from collections.abc import AsyncGenerator
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import anyio
+import pytest
+from anyio.abc import Process
+
+from guarding import make_guard
+from livepage import Live, find_free_address, serve_live
+from mapspeak.links.simulated import SoloRobot
+from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
+from mapspeak.simulator import Simulation, load_world
+
+playwright_api = pytest.importorskip("playwright.async_api")
+expect = playwright_api.expect
+pytestmark = [pytest.mark.anyio, pytest.mark.browser]
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+HOSTILE = "<img src=x onerror=alert(1)><script>alert(2)</script>"
+PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
+KEEP = "MAPSPEAK_KEEP_PICTURES"
+"""Where this variable is set, pictures for the documents are taken anew."""
+PATIENCE_MS = 20_000
+PHONE = {"width": 390, "height": 800}
+DESK = {"width": 1280, "height": 800}
+
+
+@asynccontextmanager
+async def browse(
+    address: str, *, size: dict[str, int] = DESK, is_dark: bool = False
+) -> AsyncGenerator[Any]:
+    """Open the page, and fail where it runs into an error of its own."""
+    program = next(filter(None, map(shutil.which, BROWSERS)))
+    errors: list[str] = []
+    async with playwright_api.async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        scheme = "dark" if is_dark else "light"
+        page = await browser.new_page(viewport=size, color_scheme=scheme)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("dialog", lambda dialog: errors.append(dialog.message))
+        await page.goto(address)
+        await expect(page.locator("#map img").first).to_be_visible(timeout=PATIENCE_MS)
+        yield page
+        await browser.close()
+    assert errors == []
+
+
+async def unlock(page: Any, live: Live) -> None:  # noqa: ANN401 - a page of Playwright
+    await page.fill("#token", live.tokens[-1])
+    await page.click("#unlock button")
+    await expect(page.locator("body")).to_have_class("unlocked")
+
+
+async def test_the_buttons_that_make_a_robot_stand_need_no_token(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        await live.client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        await page.click("#stop")
+        await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
+        await page.click("#hold")
+        await expect(page.locator("#state")).to_contain_text("HELD")
+        await page.click("#release")
+        await expect(page.locator("#said")).to_contain_text("Unlock the page first")
+    assert live.robot.n_stops >= 2
+
+
+async def test_a_key_stops_the_robot_but_not_while_typing(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        await page.locator("#token").press("s")
+        assert live.robot.n_stops == 0
+        await page.locator("#map").press("s")
+        await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
+    assert live.robot.n_stops == 1
+
+
+async def test_who_has_the_token_releases_checks_and_drives(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        await page.fill("#token", "00000000")
+        await page.click("#unlock button")
+        await expect(page.locator("#said")).to_contain_text("That is not the token")
+        await unlock(page, live)
+        await page.click("#hold")
+        await page.click("#release")
+        await expect(page.locator("#said")).to_have_text("Released.")
+        await page.click("#map", position={"x": 300, "y": 380})
+        await page.click("text=Check this goal")
+        await expect(page.locator("#said")).to_contain_text("away by path")
+        await page.click("#map", position={"x": 300, "y": 380})
+        await page.click("text=Drive here")
+        await expect(page.locator("#said")).to_contain_text("has begun")
+        await expect(page.locator("#state")).to_contain_text("G1 to (")
+    assert len(live.robot.goals) == 1
+
+
+async def test_what_waits_is_approved_and_refused(tmp_path: Path) -> None:
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
+    guard = make_guard(tmp_path, Policy(approval=approval))
+    async with serve_live(tmp_path, guard=guard) as live, browse(live.address) as page:
+        await unlock(page, live)
+        for button, is_let in (("Refuse", False), ("Approve", True)):
+            await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+            await expect(page.locator("#waiting")).to_contain_text("May it drive to")
+            await page.click(f"#waiting >> text={button}")
+            await expect(page.locator("#waiting")).to_be_hidden()
+            if is_let:
+                await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+            assert bool(live.robot.goals) is is_let
+
+
+async def test_calls_are_shown_as_the_client_was_answered(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        await live.client.call_tool("look_through_camera", {})
+        await page.click("#calls summary")
+        await expect(page.locator("#calls pre")).to_contain_text("Picture P1")
+        picture = page.locator("#calls img")
+        await expect(picture).to_have_attribute(
+            "alt", "Picture 1 of 1 that look_through_camera answered with"
+        )
+
+
+async def test_hostile_names_are_text_everywhere(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        noted = {"name": HOSTILE, "description": HOSTILE, "geometric_features": [HOSTILE]}
+        await live.client.call_tool("write_semantic_data", noted)
+        await live.client.call_tool("navigate_to", {"place": HOSTILE, "wait_s": 0})
+        await live.client.call_tool("look_at_map", {})
+        await expect(page.locator("#calls li")).to_have_count(3)
+        await page.locator("#calls summary").first.click()
+        await page.locator("path.leaflet-interactive").last.hover(force=True)
+        await expect(page.locator("#calls")).to_contain_text("onerror")
+        assert await page.locator("img[src=x]").count() == 0
+
+
+async def test_a_phone_shows_all_of_it_without_scrolling_sideways(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address, size=PHONE, is_dark=True) as page:
+        assert await page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        box = await page.locator("#stop").bounding_box()
+    assert box["height"] >= 44
+
+
+@asynccontextmanager
+async def run_server(folder: Path, address: str) -> AsyncGenerator[Process]:
+    """Run the command, as a client does that speaks over its standard input."""
+    command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:flat_1"]
+    command += ["--clock", "virtual", "--view", address]
+    command += ["--control", str(folder / "control"), "--audit", str(folder / "audit.jsonl")]
+    async with await anyio.open_process(command) as process:
+        assert process.stderr is not None
+        told = ""
+        while f"live page at http://{address}/" not in told:
+            told += (await process.stderr.receive()).decode()
+        yield process
+        process.kill()
+
+
+async def test_a_page_whose_server_ends_says_so_and_comes_back_with_the_next_one(
+    tmp_path: Path,
+) -> None:
+    address = find_free_address()
+    async with AsyncExitStack() as stack:
+        async with run_server(tmp_path, address):
+            page = await stack.enter_async_context(browse(f"http://{address}/"))
+            state, said = page.locator("#state"), page.locator("#said")
+            await expect(state).to_contain_text("x 0.00")
+        await expect(state).to_contain_text("does not answer")
+        await page.click("#stop")
+        await expect(said).to_contain_text("NOT SENT")
+        async with run_server(tmp_path, address):
+            await expect(state).not_to_contain_text("does not answer", timeout=PATIENCE_MS)
+
+
+async def test_what_a_page_loads_besides_map_and_camera_is_small(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        loaded = await page.evaluate(
+            "performance.getEntriesByType('resource')"
+            ".filter((each) => /page|leaflet/.test(each.name))"
+            ".reduce((sum, each) => sum + each.decodedBodySize, 0)"
+        )
+    assert 100_000 < loaded <= 400_000
+
+
+async def test_an_exploration_is_shown_as_it_goes_on(tmp_path: Path) -> None:
+    robot = SoloRobot(Simulation(load_world("office"), seed=7), has_detector=True)
+    tools = ("look", "drive", "explore", "paper")
+    async with serve_live(tmp_path, robot, toolsets=tools) as live, browse(live.address) as page:
+        for _ in range(3):
+            await live.client.call_tool("explore", {"wait_s": 10})
+        await live.client.call_tool("look_through_camera", {})
+        ladder = {"label": "ladder", "bearing_deg": 5, "range_m": 2.5}
+        noted = {"name": "ladder corner", "description": "by the door"}
+        await live.client.call_tool(
+            "write_semantic_data", {**noted, "functional_landmarks": [ladder]}
+        )
+        await live.client.call_tool("look_at_map", {})
+        await live.client.call_tool("navigate_to", {"place": "farthest room", "wait_s": 1})
+        await expect(page.locator(".leaflet-tooltip.name").first).to_be_visible()
+        await page.locator("#calls summary").nth(1).click()
+        await expect(page.locator("#calls pre")).to_contain_text("Explored")
+        if KEEP in os.environ:
+            await page.screenshot(path=PICTURES / "live-page.png")
