@@ -47,7 +47,7 @@ async def serve_view(
             f"ssh -L {port}:127.0.0.1:{port} ROBOT.",
         )
     site = HostGuard(build_site(feeds, PageKeys(tell_token)), find_security(host, port))
-    config = uvicorn.Config(site, log_level="warning", timeout_graceful_shutdown=1)
+    config = uvicorn.Config(site, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     with listen(host, port) as listener:
         shown = f"[{host}]" if ":" in host else host
         page = _PageServer(config, partial(on_ready, f"http://{shown}:{port}/"))
