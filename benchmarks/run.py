@@ -22,7 +22,7 @@ from benchmarks.figure import Figure
 
 __all__ = ["main"]
 
-NOT_BENCHMARKS = {"figure", "mutations", "run", "talking"}
+NOT_BENCHMARKS = {"figure", "mutations", "run", "talking", "typemaking"}
 
 
 @click.command()

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook
+from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
 
 MOST_LISTED = 3
 MOST_LETTERS = 6
@@ -28,7 +28,7 @@ def _values_of(book: TypeBook, field: Field) -> st.SearchStrategy[Any]:
 
 
 def _one_of(book: TypeBook, field: Field) -> st.SearchStrategy[Any]:
-    if field.is_message:
+    if field.is_message or field.type in TIMES:
         return st.deferred(lambda: messages_of(book, field.type))
     if field.type == "bool":
         return st.booleans()

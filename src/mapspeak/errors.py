@@ -6,6 +6,7 @@ MapspeakError           everything below; carries what is wrong and what to do n
 |- MapError             a map, or a map file, that cannot be what it claims
 |- GoalError            a goal that cannot be driven to, or a goal id nobody knows
 |- PolicyError          what the policy, a hold or a person does not allow
+|- SkillError           a skill nobody knows, or an argument that it does not take
 `- SemanticMapError     the semantic map file or a record in it is wrong
 """
 
@@ -80,6 +81,10 @@ class GoalError(MapspeakError):
 
 class PolicyError(MapspeakError):
     """The policy, a hold or a person does not allow what was asked."""
+
+
+class SkillError(MapspeakError):
+    """A skill is not known, or does not take an argument as it was given."""
 
 
 class SemanticMapError(MapspeakError):

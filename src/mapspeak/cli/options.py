@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,26 @@ def add_options(options: Sequence[Decorator]) -> Decorator:
     return add
 
 
+def grouped(name: str, make: Callable[..., object], fields: Sequence[str]) -> Decorator:
+    """Return a decorator that hands some options to a command as one value.
+
+    Args:
+        name: Of the argument that takes the value.
+        make: Makes it of the options.
+        fields: The names of the options, and of what they are in the value.
+    """
+
+    def group(function: Command) -> Command:
+        @wraps(function)
+        def call(**options: object) -> object:
+            made = make(**{field: options.pop(field) for field in fields})
+            return function(**options, **{name: made})
+
+        return call
+
+    return group
+
+
 def read_pose(
     _context: click.Context, _parameter: click.Parameter, value: str | None
 ) -> Pose | None:
@@ -107,6 +128,16 @@ CONTROL_OPTION = click.option(
     help="The folder by which `mapspeak stop` reaches servers; in the user's data folder unless "
     "given.",
 )
+SKILL_OPTIONS = (
+    click.option(
+        "--expose",
+        multiple=True,
+        metavar="PATTERN",
+        help="Topics, services and actions of the robot that are tools of their own while it "
+        'offers them, such as "/gripper/*".',
+    ),
+)
+
 GUARD_OPTIONS = (
     click.option(
         "--policy",
@@ -122,6 +153,17 @@ GUARD_OPTIONS = (
     ),
     CONTROL_OPTION,
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkillChoice:
+    """What `mapspeak serve` was told about skills.
+
+    Attributes:
+        expose: Patterns of names of the robot that are tools.
+    """
+
+    expose: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

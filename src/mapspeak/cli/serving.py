@@ -8,7 +8,7 @@ import signal
 import sys
 from collections.abc import Collection, Mapping
 from contextlib import AsyncExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,32 +17,24 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
-from mapspeak.cli.episodes import keep_usual_memory, open_store
 from mapspeak.cli.options import (
     DEFAULT_WORLD,
     FILE,
     GUARD_OPTIONS,
     ROBOT_HELP,
     ROBOT_OPTIONS,
+    SKILL_OPTIONS,
     GuardChoice,
+    SkillChoice,
     add_options,
-    build_guard,
-    data_folder,
+    grouped,
     read_pose,
     read_representation,
     split_names,
 )
-from mapspeak.cli.robots import (
-    RobotChoice,
-    file_for,
-    name_robots,
-    open_served_robot,
-    split_files,
-    split_memories,
-)
+from mapspeak.cli.robots import RobotChoice
+from mapspeak.cli.starting import RobotOptions, RobotStart, open_session, read_starts
 from mapspeak.cli.viewing import VIEW_OPTION, show_live, watch_calls
-from mapspeak.errors import ConfigError
-from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
@@ -53,19 +45,25 @@ if TYPE_CHECKING:
 
 TOKEN_VARIABLE = "MAPSPEAK_HTTP_TOKEN"  # noqa: S105 - the variable's name, not a token
 DEFAULT_HTTP = "127.0.0.1:8766"
+SIMULATION = (
+    *("ca_file", "seed", "clock", "has_detector"),
+    *("state_log", "final_map", "known_map", "start"),
+)
+"""Options about how a robot is reached, or simulated."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeOptions:
     """What `mapspeak serve` was asked for."""
 
-    robots: Mapping[str, "RobotStart"]
+    robots: Mapping[str, RobotStart]
     http: str | None
     tools: "ToolChoice"
     lease_s: float
     representation: "Representation | None"
     call_log: Path | None
     view: str | None
+    skills: SkillChoice
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,31 +73,6 @@ class ToolChoice:
     sets: tuple[str, ...]
     single: tuple[str, ...]
     is_read_only: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobotStart:
-    """One robot as it is to be served.
-
-    Attributes:
-        choice: Which robot, and how to reach it.
-        memory: A file, or the address of a database; None for the usual file.
-        guard: What its commands are held to.
-    """
-
-    choice: RobotChoice
-    memory: str | None
-    guard: GuardChoice
-
-
-@dataclass(frozen=True, slots=True)
-class RobotOptions:
-    """What may be said for each robot apart, as on the command line: "NAME=..."."""
-
-    robots: tuple[str, ...]
-    robot_files: tuple[str, ...]
-    semantic_maps: tuple[str, ...]
-    policies: tuple[str, ...]
 
 
 @click.command()
@@ -142,9 +115,10 @@ class RobotOptions:
     callback=split_names,
     default=None,
     help="Groups of tools, comma-separated, in place of look,places,drive,paper; others are "
-    "explore, routes, memory and ros. +NAME adds one to these, as in +explore.",
+    "explore, routes, memory, ros and skills. +NAME adds one to these, as in +explore.",
 )
 @click.option("--tools", callback=split_names, default=None, help="Single tools besides.")
+@add_options(SKILL_OPTIONS)
 @click.option("--read-only", "is_read_only", is_flag=True, help="No tool that changes anything.")
 @click.option(
     "--memory",
@@ -193,93 +167,39 @@ class RobotOptions:
 )
 @VIEW_OPTION
 @add_options(GUARD_OPTIONS)
+@grouped("choice", partial(RobotChoice, robot=""), SIMULATION)
+@grouped("guard", GuardChoice, ("audit", "control"))
+@grouped("skills", SkillChoice, ("expose",))
 def serve(
     robots: tuple[str, ...],
     robot_files: tuple[str, ...],
-    ca_file: Path | None,
-    seed: int,
-    clock: str,
-    has_detector: bool,  # noqa: FBT001 - a flag
+    choice: RobotChoice,
     http: str | None,
     toolsets: tuple[str, ...] | None,
     tools: tuple[str, ...] | None,
+    skills: SkillChoice,
     is_read_only: bool,  # noqa: FBT001 - a flag
     semantic_maps: tuple[str, ...],
-    state_log: Path | None,
-    final_map: Path | None,
-    known_map: Path | None,
-    start: Pose | None,
     lease_s: float,
     representation: "Representation | None",
     call_log: Path | None,
     view: str | None,
     policies: tuple[str, ...],
-    audit: Path | None,
-    control: Path | None,
+    guard: GuardChoice,
 ) -> None:
     """Serve a robot, or several, to MCP clients, over stdio or streaming HTTP."""
-    starts = _read_starts(
-        RobotOptions(robots, robot_files, semantic_maps, policies),
-        RobotChoice(
-            robot="",
-            ca_file=ca_file,
-            seed=seed,
-            clock=clock,
-            has_detector=has_detector,
-            state_log=state_log,
-            final_map=final_map,
-            known_map=known_map,
-            start=start,
-        ),
-        GuardChoice(audit=audit, control=control),
-    )
+    given = RobotOptions(robots, robot_files, semantic_maps, policies)
     options = ServeOptions(
-        robots=starts,
+        robots=read_starts(given, choice, guard),
         http=http,
         tools=ToolChoice(toolsets or (), tools or (), is_read_only),
         lease_s=lease_s,
         representation=representation,
         call_log=call_log,
         view=view,
+        skills=skills,
     )
     anyio.run(_serve, options)
-
-
-def _read_starts(
-    given: RobotOptions, choice: RobotChoice, guard: GuardChoice
-) -> dict[str, RobotStart]:
-    """Return each robot as it is to be served, by its name.
-
-    Args:
-        given: What may differ between robots.
-        choice: What is the same for all of them.
-        guard: Likewise.
-
-    Raises:
-        ConfigError: Something does not fit together.
-    """
-    named = name_robots(given.robots)
-    files = split_files(given.robot_files, named, "--robot-file")
-    memories = split_memories(given.semantic_maps, named)
-    limits = split_files(given.policies, named, "--policy")
-    if len(named) > 1 and _is_for_one(choice):
-        raise ConfigError(
-            "--state-log, --final-map, --map and --start are for one robot.",
-            hint="Serve one, or leave them away.",
-        )
-    return {
-        name: RobotStart(
-            choice=replace(choice, robot=address, robot_file=file_for(name, files)),
-            memory=memories[name],
-            guard=replace(guard, policy=file_for(name, limits)),
-        )
-        for name, address in named.items()
-    }
-
-
-def _is_for_one(choice: RobotChoice) -> bool:
-    files = (choice.state_log, choice.final_map, choice.known_map, choice.start)
-    return any(each is not None for each in files)
 
 
 async def _serve(options: ServeOptions) -> None:
@@ -287,10 +207,12 @@ async def _serve(options: ServeOptions) -> None:
     from mapspeak.server.fleet import FleetServer  # noqa: PLC0415
     from mapspeak.server.transport import serve_http, serve_stdio  # noqa: PLC0415
 
+    # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
+    lease_s = math.inf if options.http is None else options.lease_s
     async with AsyncExitStack() as links:
         scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
         sessions = {
-            name: await _open_session(name, start, options, links, Path(scratch))
+            name: await open_session(name, start, links, Path(scratch), lease_s=lease_s)
             for name, start in options.robots.items()
         }
         call_log = None if options.call_log is None else CallLog(options.call_log)
@@ -306,8 +228,9 @@ async def _serve(options: ServeOptions) -> None:
         gc.freeze()
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(_end_on_signal, sessions.values(), Path(scratch))
-            for session in sessions.values():
+            for session, each in zip(sessions.values(), servers.values(), strict=True):
                 tasks.start_soon(session.keep_watch)
+                tasks.start_soon(each.keep_skills)
             try:
                 if options.view is not None:
                     await tasks.start(show_live, feeds, options.view)
@@ -339,24 +262,6 @@ def _tell_typist(what: str) -> None:
         )
 
 
-async def _open_session(
-    name: str, start: RobotStart, options: ServeOptions, links: AsyncExitStack, scratch: Path
-) -> "Session":
-    from mapspeak.session import Session  # noqa: PLC0415 - heavy; help must be quick
-
-    choice = start.choice
-    guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)
-    served = await links.enter_async_context(open_served_robot(choice))
-    file = start.memory
-    if file is None:
-        folder = scratch / name if served.ros is None else data_folder()
-        file = keep_usual_memory(folder, served.map_name, choice.shown, address=choice.robot)
-    # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
-    lease_s = math.inf if options.http is None else options.lease_s
-    memory = open_store(file, map_id=served.map_name or None)
-    return Session(served.robot, memory, lease_s=lease_s, guard=guard, ros=served.ros)
-
-
 def _build_server(
     session: "Session", options: ServeOptions, call_log: "CallNoting | None"
 ) -> "MapspeakServer":
@@ -368,7 +273,8 @@ def _build_server(
     added = tuple(name.removeprefix("+") for name in chosen.sets if name.startswith("+"))
     others = tuple(name for name in chosen.sets if not name.startswith("+"))
     toolsets = (*(others or DEFAULT_TOOLSETS), *added)
-    require_ros(session, toolsets=toolsets, tools=chosen.single)
+    is_ros = "ros" if options.skills.expose else ""
+    require_ros(session, toolsets=(*toolsets, is_ros), tools=chosen.single)
     return build_server(
         session,
         toolsets=toolsets,
@@ -376,6 +282,7 @@ def _build_server(
         is_read_only=chosen.is_read_only,
         representation=options.representation or Representation.PICTURE_TABLE,
         call_log=call_log,
+        expose=options.skills.expose,
     )
 
 

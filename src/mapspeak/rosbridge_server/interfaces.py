@@ -197,6 +197,10 @@ class RosSystem:
         """Offer one more service."""
         self._services[name] = Service(name=name, type=type_name, node=node, answer=answer)
 
+    def withdraw(self, name: str) -> None:
+        """Offer a service no longer; do nothing for what is not offered."""
+        self._services.pop(name, None)
+
     def offer_typed(self, name: str, type_name: str, *, node: str, answer: Answer) -> None:
         """Offer one more service, whose requests get all their fields before it answers."""
         request = f"{type_name}_Request"

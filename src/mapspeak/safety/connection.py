@@ -178,6 +178,10 @@ class GuardedConnection:
         if not is_stop and is_name_denied(command, self._guard.policy):
             self._guard.clear(command, robot_s=self._now_s())
 
+    def is_name_denied(self, command: Command) -> bool:
+        """Return True when the policy denies a command for its name; nothing is noted."""
+        return is_name_denied(command, self._guard.policy)
+
     def _watch_over(self, command: Publish, objection: Refused | None) -> None:
         """Let the robot be watched that is about to be driven by a velocity."""
         is_velocity = _is_velocity(command.type)

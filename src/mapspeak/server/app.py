@@ -5,33 +5,44 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from mcp.server import MCPServer
+import anyio
+from mcp.server import MCPServer, ServerRequestContext
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError
 from mcp.shared.exceptions import MCPError
-from mcp_types import INVALID_PARAMS, CallToolResult, GetPromptResult, InputRequiredResult
+from mcp_types import (
+    INVALID_PARAMS,
+    CallToolResult,
+    GetPromptResult,
+    InputRequiredResult,
+    ListToolsResult,
+    PaginatedRequestParams,
+)
 from mcp_types import Tool as ListedTool
 from pydantic import ValidationError
 
 from mapspeak import __version__
-from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.calllog import CallNoting
+from mapspeak.server.listening import ListHearers
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.remarks import Remarks
 from mapspeak.server.text.offered import offering, say_error, write_instructions
 from mapspeak.server.text.wording import shorten_report, show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
+from mapspeak.server.tools.ros.goals import RosAccess, open_ros_access
+from mapspeak.server.tools.skills.board import SkillBoard
+from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
-from mapspeak.server.toolsets import build_toolsets
+from mapspeak.server.toolsets import STOP, build_toolsets, choose_tools
 from mapspeak.session import Session
+from mapspeak.skills.runs import SkillRuns
 
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
-
-STOP = "stop_robot"
 ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
 """A name of an argument, or the number of an item; pydantic names the tried types among them."""
 INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
@@ -44,13 +55,20 @@ class MapspeakServer(MCPServer[Any]):
 
     Args:
         session: What the tools work on.
+        runs: The runs of its skills.
         instructions: What a model reads before its first call.
         call_log: Where every call is noted; None for nowhere.
+
+    Attributes:
+        skills: The tools that come and go.
+        hearers: Who is told when they do.
+        exposure: Looks for those that the robot offers; None where none are wanted.
     """
 
     def __init__(
         self,
         session: Session,
+        runs: SkillRuns,
         *,
         instructions: str,
         call_log: CallNoting | None = None,
@@ -70,11 +88,23 @@ class MapspeakServer(MCPServer[Any]):
         self._former: dict[str, Mapping[str, str]] = {}
         self._remembering: set[str] = set()
         self._remarks = Remarks(session)
+        self.skills = SkillBoard(runs, others=lambda: self._arguments)
+        self.hearers = ListHearers(self)
+        self.exposure: Exposure | None = None
 
     @property
     def n_tools(self) -> int:
         """How many tools it offers."""
         return len(self._arguments)
+
+    def expose(self, ros: RosAccess, patterns: tuple[str, ...]) -> None:
+        """Look for what the robot offers of some names, once `keep_skills` runs."""
+        self.exposure = Exposure(ros, self.skills, patterns, tell=self.hearers.tell)
+
+    async def keep_skills(self) -> None:
+        """Let skills run, and look for those that the robot offers, until cancelled."""
+        work = anyio.sleep_forever if self.exposure is None else self.exposure.keep_looking
+        await self.skills.runs.keep_going(work)
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
@@ -138,12 +168,12 @@ class MapspeakServer(MCPServer[Any]):
         """Call a tool, and once more when a person has agreed to what it needs their word for."""
         guard = self._session.guard
         if guard is None:
-            return await super().call_tool(name, arguments, context)
+            return await self._run(name, arguments, context)
         asking = Asking(context, approval=guard.policy.approval, client=name_client(context))
         if not asking.take_answers(guard.approvals):
             raise _disagreed()
         try:
-            return await super().call_tool(name, arguments, context)
+            return await self._run(name, arguments, context)
         except ToolError as error:
             needed = error.__cause__
             if not isinstance(needed, ApprovalNeededError) or not asking.can_ask:
@@ -153,6 +183,13 @@ class MapspeakServer(MCPServer[Any]):
                 return question
             if not await asking.ask_at_once(needed, guard.approvals):
                 raise _disagreed() from error
+        return await self._run(name, arguments, context)
+
+    async def _run(
+        self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
+    ) -> CallToolResult | InputRequiredResult:
+        if name in self.skills.skills:
+            return await self.skills.call(name, arguments, context)
         return await super().call_tool(name, arguments, context)
 
     def offer(self, tool: Tool) -> None:
@@ -205,13 +242,20 @@ class MapspeakServer(MCPServer[Any]):
             raise ToolError(f"{name} wants a number for {', '.join(wrong)}, not true or false.")
 
     async def note_hang_up(self, client: str) -> None:
-        """Stop a drive that nobody is there for any more."""
+        """Stop a drive, and end skills, that nobody is there for any more."""
         await self._session.client_is_gone(client)
+        await self.skills.runs.client_is_gone(client)
+
+    async def _handle_list_tools(
+        self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
+    ) -> ListToolsResult:
+        self.hearers.note(ctx)
+        return await super()._handle_list_tools(ctx, params)
 
     async def list_tools(self) -> list[ListedTool]:
         """List the tools with schemas freed of what no model needs."""
         listed = await super().list_tools()
-        return [
+        lean = [
             tool.model_copy(
                 update={
                     "input_schema": lean_input(tool.input_schema),
@@ -220,6 +264,7 @@ class MapspeakServer(MCPServer[Any]):
             )
             for tool in listed
         ]
+        return [*lean, *self.skills.listed]
 
 
 def _read_list(text: str) -> list[Any]:
@@ -249,6 +294,7 @@ def build_server(
     is_read_only: bool = False,
     representation: Representation = Representation.PICTURE_TABLE,
     call_log: CallNoting | None = None,
+    expose: Sequence[str] = (),
 ) -> MapspeakServer:
     """Build the server with the chosen tools, always in the same order.
 
@@ -259,6 +305,8 @@ def build_server(
         is_read_only: Leaves out every tool that changes something; stopping stays.
         representation: How look_at_map shows the map.
         call_log: Where every call is noted; None for nowhere.
+        expose: Patterns of names of topics, services and actions that are tools too while the
+            robot offers them and `keep_skills` runs.
 
     Raises:
         ConfigError: There is no such toolset or tool.
@@ -268,58 +316,22 @@ def build_server(
         session.episodes.close()
     elif session.ros is not None:
         session.ros.advertise_early()
-    known = build_toolsets(session, representation)
+    ros, runs = open_ros_access(session), SkillRuns()
+    known = build_toolsets(session, representation, ros=ros, runs=runs)
+    if expose:
+        toolsets, tools = {*toolsets, "skills"}, {*tools, STOP}
     chosen = choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
     moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
     with offering({tool.name for tool in chosen}):
         instructions = write_instructions(moves=moves)
-        server = MapspeakServer(session, instructions=instructions, call_log=call_log)
+        server = MapspeakServer(session, runs, instructions=instructions, call_log=call_log)
+        server.skills.is_read_only = is_read_only
         for tool in chosen:
             server.offer(tool)
+    if expose:
+        server.expose(ros, tuple(expose))
     add_prompts(server)
     return server
-
-
-def choose_tools(
-    known: Mapping[str, Sequence[Tool]],
-    *,
-    toolsets: Iterable[str],
-    tools: Iterable[str],
-    is_read_only: bool,
-) -> list[Tool]:
-    """Return the chosen tools in their fixed order, with stop_robot where one moves the robot.
-
-    Raises:
-        ConfigError: There is no such toolset or tool.
-    """
-    chosen_sets, chosen_tools = set(toolsets), set(tools)
-    _check_names("toolset", chosen_sets, set(known))
-    _check_names("tool", chosen_tools, {tool.name for group in known.values() for tool in group})
-    chosen = [
-        tool
-        for toolset, group in known.items()
-        for tool in group
-        if (toolset in chosen_sets or tool.name in chosen_tools)
-        and (not is_read_only or tool.effect in (ToolEffect.READS, ToolEffect.STOPS))
-    ]
-    if any(tool.effect is ToolEffect.MOVES for tool in chosen) and STOP not in {
-        tool.name for tool in chosen
-    }:
-        # Whoever can start the robot can stop it.
-        return choose_tools(
-            known, toolsets=chosen_sets, tools={*chosen_tools, STOP}, is_read_only=is_read_only
-        )
-    # find_place stands in two toolsets.
-    return list({tool.name: tool for tool in reversed(chosen)}.values())[::-1]
-
-
-def _check_names(what: str, asked: set[str], known: set[str]) -> None:
-    strangers = sorted(asked - known)
-    if strangers:
-        raise ConfigError(
-            f"There is no {what} named {', '.join(map(repr, strangers))}.",
-            hint=f"Choose from {', '.join(sorted(known))}.",
-        )
 
 
 def _disagreed() -> ToolError:

@@ -8,16 +8,23 @@ from collections.abc import Mapping
 from typing import Any
 
 import anyio
-from mcp.server import MCPServer
+from mcp.server import MCPServer, ServerRequestContext
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError
-from mcp_types import CallToolResult, InputRequiredResult
+from mcp_types import (
+    CallToolResult,
+    InputRequiredResult,
+    ListToolsResult,
+    PaginatedRequestParams,
+)
 from mcp_types import Tool as ListedTool
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.server.app import STOP, MapspeakServer
+from mapspeak.server.app import MapspeakServer
+from mapspeak.server.listening import ListHearers
 from mapspeak.server.prompts import add_prompts
+from mapspeak.server.toolsets import STOP
 
 ARGUMENT = "robot"
 
@@ -47,7 +54,16 @@ class FleetServer(MCPServer[Any]):
             log_level="WARNING",
         )
         self._servers = dict(servers)
+        self._hearers = ListHearers(self)
+        for server in servers.values():
+            server.hearers.pass_on(self._hearers.tell)
         add_prompts(self)
+
+    async def _handle_list_tools(
+        self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
+    ) -> ListToolsResult:
+        self._hearers.note(ctx)
+        return await super()._handle_list_tools(ctx, params)
 
     async def list_tools(self) -> list[ListedTool]:
         """List each tool once, with the names of the robots that have it."""

@@ -1,4 +1,4 @@
-"""Every goal that was sent with the ROS tools, by its handle; the latest last."""
+"""Every goal that was sent with the ROS tools, by its handle, and what all tools of ROS share."""
 
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -16,8 +16,9 @@ from mapspeak.ros.actions import (
 )
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.server.text.offered import lead
-from mapspeak.server.tools.ros.commands import RosCommands
+from mapspeak.server.tools.ros.commands import Publisher, RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry
+from mapspeak.session import Session
 
 MOST_KEPT = 200
 POLL_S = 0.2
@@ -193,3 +194,34 @@ class ActionBook:
             type_name=type_name,
             patience=self._patience,
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RosAccess:
+    """One session's way to its ROS system; nothing is asked before it is used.
+
+    Attributes:
+        inquiry: Asks.
+        commands: Tells.
+        goals: Every goal that was sent.
+        publisher: Publishes, one velocity at a time.
+    """
+
+    session: Session
+    inquiry: RosInquiry
+    commands: RosCommands
+    goals: ActionBook
+    publisher: Publisher
+
+
+def open_ros_access(session: Session) -> RosAccess:
+    """Return the way to a session's ROS system."""
+    inquiry = RosInquiry(session)
+    commands = RosCommands(lambda: inquiry.connection)
+    return RosAccess(
+        session=session,
+        inquiry=inquiry,
+        commands=commands,
+        goals=ActionBook(inquiry, commands),
+        publisher=Publisher(session, commands),
+    )

@@ -143,7 +143,7 @@ class RosInquiry:
 
     async def fetch_actions(self) -> tuple[str, ...]:
         """Return all actions; ROS 1 shows them by their topics."""
-        return _actions_of(await self.fetch_graph())
+        return actions_of(await self.fetch_graph())
 
     async def check_action(self, action: str) -> None:
         """Return when there is such an action.
@@ -152,7 +152,7 @@ class RosInquiry:
             LinkError: There is none; names those most like it.
         """
         if action not in await self.fetch_actions():
-            actions = _actions_of(await self._renew_graph())
+            actions = actions_of(await self._renew_graph())
             if action not in actions:
                 raise self.stranger("action", action, actions)
 
@@ -333,7 +333,8 @@ def _find_type_by_name(action: str) -> str | None:
     return next((name for name in types if name.partition("/")[2].lower() == wanted), None)
 
 
-def _actions_of(graph: RosGraph) -> tuple[str, ...]:
+def actions_of(graph: RosGraph) -> tuple[str, ...]:
+    """Return all actions; ROS 1 shows them by their topics."""
     if graph.dialect is Dialect.ROS2:
         return graph.actions
     goals = (name for name, kind in graph.types.items() if kind.endswith(ACTION_GOAL))

@@ -68,11 +68,13 @@ GOAL_POSE = "geometry_msgs/PoseStamped"
 class TopicTools:
     """Listing, describing, hearing and publishing."""
 
-    def __init__(self, session: Session, inquiry: RosInquiry, commands: RosCommands) -> None:
+    def __init__(
+        self, session: Session, inquiry: RosInquiry, commands: RosCommands, publisher: Publisher
+    ) -> None:
         self._session = session
         self._inquiry = inquiry
         self._commands = commands
-        self._publisher = Publisher(session, commands)
+        self._publisher = publisher
         self._viewed: dict[str, tuple[Message, MessageView]] = {}
 
     @tool(

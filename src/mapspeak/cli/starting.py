@@ -1,0 +1,108 @@
+"""Which robots are served, and what each of them begins with."""
+
+from contextlib import AsyncExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mapspeak.cli.episodes import keep_usual_memory, open_store
+from mapspeak.cli.options import GuardChoice, build_guard, data_folder
+from mapspeak.cli.robots import (
+    RobotChoice,
+    file_for,
+    name_robots,
+    open_served_robot,
+    split_files,
+    split_memories,
+)
+from mapspeak.errors import ConfigError
+
+if TYPE_CHECKING:
+    from mapspeak.session import Session
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotStart:
+    """One robot as it is to be served.
+
+    Attributes:
+        choice: Which robot, and how to reach it.
+        memory: A file, or the address of a database; None for the usual file.
+        guard: What its commands are held to.
+    """
+
+    choice: RobotChoice
+    memory: str | None
+    guard: GuardChoice
+
+
+@dataclass(frozen=True, slots=True)
+class RobotOptions:
+    """What may be said for each robot apart, as on the command line: "NAME=..."."""
+
+    robots: tuple[str, ...]
+    robot_files: tuple[str, ...]
+    semantic_maps: tuple[str, ...]
+    policies: tuple[str, ...]
+
+
+def read_starts(
+    given: RobotOptions, choice: RobotChoice, guard: GuardChoice
+) -> dict[str, RobotStart]:
+    """Return each robot as it is to be served, by its name.
+
+    Args:
+        given: What may differ between robots.
+        choice: What is the same for all of them.
+        guard: Likewise.
+
+    Raises:
+        ConfigError: Something does not fit together.
+    """
+    named = name_robots(given.robots)
+    files = split_files(given.robot_files, named, "--robot-file")
+    memories = split_memories(given.semantic_maps, named)
+    limits = split_files(given.policies, named, "--policy")
+    if len(named) > 1 and _is_for_one(choice):
+        raise ConfigError(
+            "--state-log, --final-map, --map and --start are for one robot.",
+            hint="Serve one, or leave them away.",
+        )
+    return {
+        name: RobotStart(
+            choice=replace(choice, robot=address, robot_file=file_for(name, files)),
+            memory=memories[name],
+            guard=replace(guard, policy=file_for(name, limits)),
+        )
+        for name, address in named.items()
+    }
+
+
+def _is_for_one(choice: RobotChoice) -> bool:
+    files = (choice.state_log, choice.final_map, choice.known_map, choice.start)
+    return any(each is not None for each in files)
+
+
+async def open_session(
+    name: str, start: RobotStart, links: AsyncExitStack, scratch: Path, *, lease_s: float
+) -> "Session":
+    """Return a session over one robot, which lasts as long as its links.
+
+    Args:
+        name: What the operator calls the robot; empty for an only one.
+        start: How it is to be served.
+        links: Closes what is opened.
+        scratch: A folder for a memory that does not last.
+        lease_s: Without a client for so long, a driving robot is stopped.
+    """
+    from mapspeak.session import Session  # noqa: PLC0415 - heavy; help must be quick
+
+    choice = start.choice
+    guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)
+    served = await links.enter_async_context(open_served_robot(choice))
+    file = start.memory
+    if file is None:
+        folder = scratch / name if served.ros is None else data_folder()
+        file = keep_usual_memory(folder, served.map_name, choice.shown, address=choice.robot)
+    memory = open_store(file, map_id=served.map_name or None)
+    return Session(served.robot, memory, lease_s=lease_s, guard=guard, ros=served.ros)

@@ -1,0 +1,134 @@
+"""The skills that are tools now: listed, called, put up and taken down while clients are there."""
+
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any
+
+from mcp.server.mcpserver import Context
+from mcp.server.mcpserver.exceptions import ToolError
+from mcp_types import CallToolResult, TextContent, ToolAnnotations
+from mcp_types import Tool as ListedTool
+
+from mapspeak.errors import MapspeakError
+from mapspeak.memory.quoting import quote
+from mapspeak.server.text.offered import say_error
+from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
+from mapspeak.server.tools.skills.reports import describe_skill, say_run
+from mapspeak.server.tools.skills.running import tell_news
+from mapspeak.server.tools.skills.schema import schema_of
+from mapspeak.skills import ParameterKind, Skill, SkillEffect, SkillParameter
+from mapspeak.skills.arguments import check_value
+from mapspeak.skills.runs import SkillRuns
+
+WAIT = SkillParameter(
+    name="wait_s",
+    kind=ParameterKind.NUMBER,
+    unit="s to wait for its end",
+    least=0.0,
+    most=LONGEST_WAIT_S,
+    default=10.0,
+)
+"""What the tool of a skill takes that may last longer than a call."""
+RESERVED = frozenset({"wait_s", "for_s", "robot"})
+"""Names that no argument of a skill may have: they are the tool's own."""
+MOST_NAME = 60
+MOST_TITLE = 60
+
+
+def name_tool(name: str, *, taken: Collection[str] = ()) -> str:
+    """Return what a name of ROS or of a skill is called as a tool, like no other tool."""
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()[-MOST_NAME:].strip("_")
+    base = plain or "skill"
+    if base not in taken:
+        return base
+    numbered = (f"robot_{base}" if n == 1 else f"robot_{base}_{n}" for n in range(1, 1000))
+    return next(each for each in numbered if each not in taken)
+
+
+class SkillBoard:
+    """Offers skills as tools.
+
+    Args:
+        runs: Runs them.
+        others: The names of the tools that are no skills.
+
+    Attributes:
+        is_read_only: It takes only skills that read.
+    """
+
+    def __init__(self, runs: SkillRuns, *, others: Callable[[], Collection[str]]) -> None:
+        self.runs = runs
+        self._others = others
+        self.is_read_only = False
+        self._skills: dict[str, Skill] = {}
+        self._listed: dict[str, ListedTool] = {}
+        self.n_changes = 0
+
+    @property
+    def skills(self) -> Mapping[str, Skill]:
+        """The skills by the names of their tools."""
+        return self._skills
+
+    @property
+    def listed(self) -> Iterable[ListedTool]:
+        """The tools as clients are told of them."""
+        return self._listed.values()
+
+    @property
+    def taken_names(self) -> set[str]:
+        """The names that another tool or skill has."""
+        return {*self._others(), *self._skills}
+
+    def put_up(self, skill: Skill) -> None:
+        """Offer a skill under its name, in place of one of that name."""
+        spec = skill.spec
+        if self.is_read_only and spec.effect is not SkillEffect.READS:
+            return
+        parameters = (*spec.parameters, *((WAIT,) if _is_long(skill) else ()))
+        reads = ToolAnnotations(read_only_hint=True)
+        acts = ToolAnnotations(open_world_hint=False)
+        self._skills[spec.name] = skill
+        self._listed[spec.name] = ListedTool(
+            name=spec.name,
+            title=quote(spec.description or spec.name, most=MOST_TITLE).strip('"'),
+            description=describe_skill(spec),
+            input_schema=schema_of(parameters),
+            annotations=reads if spec.effect is SkillEffect.READS else acts,
+        )
+        self.n_changes += 1
+
+    def take_down(self, name: str) -> None:
+        """Offer a skill no longer; what runs of it goes on."""
+        if self._skills.pop(name, None) is not None:
+            del self._listed[name]
+            self.n_changes += 1
+
+    async def call(
+        self, name: str, arguments: Mapping[str, Any], context: Context[Any, Any] | None
+    ) -> CallToolResult:
+        """Run a skill, and answer how it ended or, where it takes long, how it is called.
+
+        Raises:
+            ToolError: It could not be begun.
+        """
+        skill = self._skills[name]
+        own = dict(arguments)
+        try:
+            wait_s = LONGEST_WAIT_S
+            if _is_long(skill):
+                given = own.pop(WAIT.name, WAIT.default)
+                wait_s = check_value(WAIT, given, where=WAIT.name, what=name)
+            run = await self.runs.begin(
+                skill,
+                own,
+                client="" if context is None else client_of(context),
+                wait_s=wait_s,
+                on_news=None if context is None else tell_news(context),
+            )
+        except MapspeakError as error:
+            raise ToolError(say_error(error)) from error
+        return CallToolResult(content=[TextContent(type="text", text=say_run(run))])
+
+
+def _is_long(skill: Skill) -> bool:
+    return skill.spec.timeout_s > LONGEST_WAIT_S

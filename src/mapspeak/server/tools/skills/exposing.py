@@ -1,0 +1,222 @@
+"""Which interfaces of a robot are tools: found when it offers them, withdrawn when it does not."""
+
+import fnmatch
+import logging
+import math
+import re
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+
+import anyio
+
+from mapspeak.errors import LinkError, MapspeakError, PolicyError
+from mapspeak.ros.messages.fields import bare_type
+from mapspeak.ros.port import RosGraph
+from mapspeak.safety import Act, Call, GuardedConnection, Publish
+from mapspeak.server.tools.ros.census import fetch_hearers, fetch_publishers
+from mapspeak.server.tools.ros.goals import RosAccess
+from mapspeak.server.tools.ros.inquiry import actions_of
+from mapspeak.server.tools.ros.services import FOLDED
+from mapspeak.server.tools.skills.board import RESERVED, SkillBoard, name_tool
+from mapspeak.server.tools.skills.interfaces import (
+    Interface,
+    InterfaceKind,
+    InterfaceSkill,
+    open_interface,
+)
+
+MOST_EXPOSED = 100
+"""Tools; a model that reads more of them reads nothing else."""
+EVERY_S = 2.0
+"""Wall time between two looks at what the robot offers."""
+KEPT_S = 20.0
+"""Wall time for which a type, and who is at a topic, is not asked for again while it is there."""
+PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
+
+logger = logging.getLogger(__name__)
+
+
+class Exposure:
+    """Keeps the board to what the robot offers of some names.
+
+    Args:
+        ros: The way to the robot.
+        board: Where the tools are put up.
+        patterns: Of full names, as the shell writes them: "/gripper/*".
+        tell: Told when tools have changed.
+        every_s: Between two looks.
+    """
+
+    def __init__(
+        self,
+        ros: RosAccess,
+        board: SkillBoard,
+        patterns: tuple[str, ...],
+        *,
+        tell: Callable[[], Awaitable[None]],
+        every_s: float = EVERY_S,
+    ) -> None:
+        self._ros = ros
+        self._board = board
+        self._patterns = patterns
+        self._tell = tell
+        self._every_s = every_s
+        self._offered: dict[Interface, str] = {}
+        self._left_out: set[Interface] = set()
+        self._answers: dict[str, tuple[list[Interface], float]] = {}
+
+    async def keep_looking(self) -> None:
+        """Look again and again; a robot out of reach keeps its tools until it is back."""
+        while True:
+            if self._ros.inquiry.connection.lost_for_s is not None:
+                self.forget()
+            with suppress(MapspeakError):
+                await self.look()
+            await anyio.sleep(self._every_s)
+
+    def forget(self) -> None:
+        """Ask for everything anew with the next look: the robot may be another one."""
+        self._answers.clear()
+        self._left_out.clear()
+
+    async def look(self) -> None:
+        """Put up what is new, take down what is gone, and tell clients where that is anything.
+
+        Raises:
+            LinkError: The robot cannot be asked.
+        """
+        n_before = self._board.n_changes
+        found = await self._find()
+        for gone in [each for each in self._offered if each not in found]:
+            self._board.take_down(self._offered.pop(gone))
+        self._left_out &= set(found)
+        for interface in found:
+            if interface not in self._offered and interface not in self._left_out:
+                await self._offer(interface)
+        if self._board.n_changes != n_before:
+            await self._tell()
+
+    async def _offer(self, interface: Interface) -> None:
+        """Put up one interface; one that cannot be is told of once."""
+        try:
+            if len(self._offered) >= MOST_EXPOSED:
+                raise LinkError(
+                    f"{MOST_EXPOSED} tools are exposed already.", hint="Name fewer of them."
+                )
+            self._check_policy(interface)
+            skill = await self._open(interface)
+        except MapspeakError as error:
+            self._left_out.add(interface)
+            logger.warning("%s is not exposed: %s", interface.name, error)
+            return
+        self._board.put_up(skill)
+        self._offered[interface] = skill.spec.name
+
+    async def _open(self, interface: Interface) -> InterfaceSkill:
+        prefix = {InterfaceKind.PUBLISH: "publish_", InterfaceKind.READ: "read_"}
+        base = f"{prefix.get(interface.kind, '')}{interface.name.strip('/')}"
+        name = name_tool(base, taken=self._board.taken_names)
+        return await open_interface(interface, self._ros, name=name, reserved=RESERVED)
+
+    def _check_policy(self, interface: Interface) -> None:
+        """Return when the policy does not deny an interface for its name.
+
+        Raises:
+            PolicyError: It does: what would always be refused is no tool.
+        """
+        command = _command_of(interface)
+        connection = self._ros.inquiry.connection
+        is_denied = (
+            command is not None
+            and isinstance(connection, GuardedConnection)
+            and connection.is_name_denied(command)
+        )
+        if is_denied:
+            raise PolicyError("The policy denies it.", hint="A person can allow it in policy.yaml.")
+
+    async def _find(self) -> list[Interface]:
+        """Return what the robot offers now of what is asked for."""
+        connection = self._ros.inquiry.connection
+        graph = await connection.fetch_graph()
+        services = await connection.fetch_services()
+        topics = _plain_topics(graph)
+        actions = [name for name in actions_of(graph) if self._is_wanted(name)]
+        found = [
+            *[each for name in actions for each in await self._ask(self._find_action, name)],
+            *[
+                each
+                for name in services
+                if self._is_wanted(name) and (name in self._patterns or not _is_everybodys(name))
+                for each in await self._ask(self._find_service, name)
+            ],
+            *[
+                each
+                for name, kind in topics.items()
+                if self._is_wanted(name)
+                for each in await self._ask(self._find_sides, name, kind)
+            ],
+        ]
+        here = {*actions, *services, *topics}
+        self._answers = {name: each for name, each in self._answers.items() if name in here}
+        return found
+
+    async def _ask(
+        self, find: Callable[..., Awaitable[list[Interface]]], name: str, *more: str
+    ) -> list[Interface]:
+        """Return what is found by a name; what was found lately, or before an error, is as good."""
+        known, asked_s = self._answers.get(name, ([], -math.inf))
+        if anyio.current_time() < asked_s + KEPT_S:
+            return known
+        with suppress(LinkError):
+            known = await find(name, *more)
+        self._answers[name] = (known, anyio.current_time())
+        return known
+
+    async def _find_action(self, action: str) -> list[Interface]:
+        kind = await self._ros.inquiry.fetch_action_type(action)
+        return [Interface(InterfaceKind.ACTION, action, bare_type(kind))]
+
+    async def _find_service(self, service: str) -> list[Interface]:
+        kind = await self._ros.inquiry.connection.fetch_service_type(service)
+        return [Interface(InterfaceKind.SERVICE, service, bare_type(kind))]
+
+    async def _find_sides(self, topic: str, kind: str) -> list[Interface]:
+        """Return whether a topic is read or published on: by who else is there."""
+        connection = self._ros.inquiry.connection
+        ends = {
+            InterfaceKind.READ: await fetch_publishers(connection, topic),
+            InterfaceKind.PUBLISH: await fetch_hearers(connection, topic),
+        }
+        return [Interface(side, topic, bare_type(kind)) for side, end in ends.items() if end.others]
+
+    def _is_wanted(self, name: str) -> bool:
+        return any(fnmatch.fnmatchcase(name, pattern) for pattern in self._patterns)
+
+
+def _is_everybodys(service: str) -> bool:
+    """Return True for services that every node has, and for rosapi's and those within actions."""
+    forms = (form for _, form in FOLDED.values())
+    return "/_action/" in service or any(re.fullmatch(form, service) for form in forms)
+
+
+def _plain_topics(graph: RosGraph) -> Mapping[str, str]:
+    """Return the topics that are no part of an action."""
+    parts = {f"{action}/{part}" for action in actions_of(graph) for part in PARTS_OF_ACTION}
+    return {
+        topic: kind
+        for topic, kind in sorted(graph.types.items())
+        if topic not in parts and "/_action/" not in topic
+    }
+
+
+def _command_of(interface: Interface) -> Act | Call | Publish | None:
+    name, kind = interface.name, interface.type
+    match interface.kind:
+        case InterfaceKind.ACTION:
+            return Act(action=name, type=kind, goal={}, true_type=kind)
+        case InterfaceKind.SERVICE:
+            return Call(service=name, type=kind, arguments={})
+        case InterfaceKind.PUBLISH:
+            return Publish(topic=name, type=kind, message={})
+        case InterfaceKind.READ:
+            return None

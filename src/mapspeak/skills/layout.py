@@ -1,0 +1,280 @@
+"""A ROS message type as flat parameters, and messages built of arguments and read back."""
+
+import base64
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from mapspeak.errors import LinkError
+from mapspeak.memory.quoting import clean_line
+from mapspeak.ros.definitions.types import (
+    FLOATS,
+    MOST_NESTED,
+    TEXTS,
+    TIMES,
+    WHOLES,
+    Field,
+    MessageType,
+    TypeBook,
+)
+from mapspeak.ros.messages.fields import Message, bare_type
+from mapspeak.skills.skill import JsonValue, ParameterKind, SkillParameter
+
+MOST_FLAT = 40
+"""A type with more plain fields keeps its messages as objects."""
+MOST_LISTED = 1000
+"""A list of no stated length takes no more from a model."""
+MOST_DESCRIBED = 3000
+"""Parameters, with those within others; no type that people use comes near."""
+MOST_IN_LIST = 32
+"""Of bytes; longer ones are given as one text in base64."""
+MOST_TEXT = 100_000
+MOST_REMARK = 100
+REMARK = re.compile(r"\s*\S+\s+(?P<name>\w+)\b[^#\n]*#+\s*(?P<said>.+)")
+
+UNITS = {
+    "geometry_msgs/Point": dict.fromkeys("xyz", "m"),
+    "geometry_msgs/Point32": dict.fromkeys("xyz", "m"),
+    "geometry_msgs/Transform": {"translation": "m"},
+    "geometry_msgs/Twist": {"linear": "m/s", "angular": "rad/s"},
+    "geometry_msgs/Accel": {"linear": "m/s2", "angular": "rad/s2"},
+    "geometry_msgs/Wrench": {"force": "N", "torque": "Nm"},
+    "geometry_msgs/Pose2D": {"x": "m", "y": "m", "theta": "rad"},
+    "control_msgs/GripperCommand": {"position": "m", "max_effort": "N"},
+    "builtin_interfaces/Time": {"sec": "s", "nanosec": "ns"},
+    "builtin_interfaces/Duration": {"sec": "s", "nanosec": "ns"},
+    "time": {"secs": "s", "nsecs": "ns"},
+    "duration": {"secs": "s", "nsecs": "ns"},
+}
+"""Of the fields of well-known types; a field that is a message hands its own on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A parameter and where in the message its value belongs."""
+
+    parameter: SkillParameter
+    path: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MessageLayout:
+    """A message type as the parameters of a skill; `build_layout` makes one."""
+
+    slots: tuple[Slot, ...]
+
+    @cached_property
+    def parameters(self) -> tuple[SkillParameter, ...]:
+        """The parameters, in the order of the fields."""
+        return tuple(slot.parameter for slot in self.slots)
+
+    def build(self, arguments: Mapping[str, JsonValue]) -> dict[str, Any]:
+        """Return the message that some arguments say; what they leave out stays out."""
+        message: dict[str, Any] = {}
+        for slot in self.slots:
+            if slot.parameter.name in arguments:
+                inner = message
+                for part in slot.path[:-1]:
+                    inner = inner.setdefault(part, {})
+                inner[slot.path[-1]] = arguments[slot.parameter.name]
+        return message
+
+    def read(self, message: Message) -> dict[str, JsonValue]:
+        """Return a message as arguments that would build it; large lists by their length."""
+        found: dict[str, JsonValue] = {}
+        for slot in self.slots:
+            value: Any = message
+            for part in slot.path:
+                value = value.get(part) if isinstance(value, Mapping) else None
+            if value is not None:
+                found[slot.parameter.name] = _read_value(slot.parameter, value)
+        return found
+
+
+def _read_value(parameter: SkillParameter, value: object) -> JsonValue:
+    """Return a value of a message as its argument would be given."""
+    match parameter.kind:
+        case ParameterKind.OBJECT if isinstance(value, Mapping):
+            inner = {each.name: each for each in parameter.fields}
+            return {name: _read_value(inner[name], each) for name, each in value.items()}
+        case ParameterKind.BYTES:
+            return _read_bytes(value)
+        case ParameterKind.LIST:
+            return _read_list(parameter.item, value)
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _read_bytes(value: object) -> JsonValue:
+    if isinstance(value, str):
+        return value
+    data = bytes(value)  # type: ignore[call-overload]
+    return base64.b64encode(data).decode() if len(data) <= MOST_TEXT else f"({len(data)} bytes)"
+
+
+def _read_list(item: SkillParameter | None, value: object) -> JsonValue:
+    if isinstance(value, str):
+        value = base64.b64decode(value)
+    listed = value.tolist() if isinstance(value, np.ndarray) else list(value)  # type: ignore[call-overload]
+    if len(listed) > MOST_LISTED:
+        return f"({len(listed)} values)"
+    return listed if item is None else [_read_value(item, each) for each in listed]
+
+
+def build_layout(
+    book: TypeBook, type_name: str, *, reserved: frozenset[str] = frozenset()
+) -> MessageLayout:
+    """Return a message type as parameters.
+
+    Args:
+        book: Holds the type and all types within.
+        type_name: As "package/Type".
+        reserved: Names that are no parameter's; one that would have such a name is called "its_…".
+
+    Raises:
+        LinkError: A type within is not described, or holds itself, or there are too many.
+    """
+    builder = _Builder(book)
+    message = book[bare_type(type_name)]
+    builder.check(message, above=())
+    leaves = list(islice(builder.leaves(message, path=(), unit=""), MOST_FLAT + 1))
+    if len(leaves) > MOST_FLAT:
+        leaves = [builder.leaf(message, each, (each.name,), "") for each in message.fields]
+    return MessageLayout(tuple(_with_names(leaves, reserved)))
+
+
+def _with_names(leaves: list[Slot], reserved: frozenset[str]) -> Iterator[Slot]:
+    """Name each parameter by its path; where that says two things, with two low lines between."""
+    joined = ["_".join(leaf.path) for leaf in leaves]
+    glue = "_" if len(set(joined)) == len(joined) else "__"
+    for leaf in leaves:
+        name = glue.join(leaf.path)
+        named = f"its_{name}" if name in reserved else name
+        yield Slot(replace(leaf.parameter, name=named), leaf.path)
+
+
+class _Builder:
+    def __init__(self, book: TypeBook) -> None:
+        self._book = book
+        self._remarks: dict[str, Mapping[str, str]] = {}
+        self._checked: set[str] = set()
+        self._n_described = 0
+
+    def check(self, message: MessageType, *, above: tuple[str, ...]) -> None:
+        """Return when all types within are described and none holds itself."""
+        if message.name in self._checked:
+            return
+        for field in message.fields:
+            if not field.is_message:
+                continue
+            inside = (*above, message.name)
+            if bare_type(field.type) in inside or len(inside) > MOST_NESTED:
+                raise LinkError(
+                    f"The type {inside[0]} holds itself, in {message.name}.{field.name}.",
+                    hint="No message can be of such a type: correct its definition.",
+                )
+            if not self._book.knows(field.type):
+                raise LinkError(
+                    f"The type {field.type} of {message.name}.{field.name} is not described.",
+                    hint="Install it where mapspeak runs, or ask a robot that tells its types.",
+                )
+            self.check(self._book[field.type], above=inside)
+        self._checked.add(message.name)
+
+    def leaves(self, message: MessageType, *, path: tuple[str, ...], unit: str) -> Iterator[Slot]:
+        """Yield the fields of a message that are no messages themselves, all the way down."""
+        for field in message.fields:
+            inner = self._inner(field)
+            where = (*path, field.name)
+            if inner is not None and field.length is None:
+                yield from self.leaves(inner, path=where, unit=self._unit(message, field, unit))
+            else:
+                yield self.leaf(message, field, where, unit)
+
+    def leaf(self, message: MessageType, field: Field, path: tuple[str, ...], unit: str) -> Slot:
+        """Return a field as one parameter, whatever it holds."""
+        return Slot(self._parameter(message, field, unit), path)
+
+    def _parameter(self, message: MessageType, field: Field, unit: str) -> SkillParameter:
+        self._n_described += 1
+        if self._n_described > MOST_DESCRIBED:
+            raise LinkError(
+                f"A type with {message.name} within has more than {MOST_DESCRIBED} fields.",
+                hint="No model could fill it in: leave it out.",
+            )
+        unit = self._unit(message, field, unit)
+        remark = self._remark(message, field)
+        if field.length is None:
+            return self._one(field, name=field.name, unit=unit, remark=remark)
+        longest = field.length or field.most or MOST_LISTED
+        if field.type == "uint8" and longest > MOST_IN_LIST:
+            return SkillParameter(
+                name=field.name,
+                kind=ParameterKind.BYTES,
+                description=remark,
+                most=MOST_TEXT,
+            )
+        return SkillParameter(
+            name=field.name,
+            kind=ParameterKind.LIST,
+            description=remark,
+            unit=unit,
+            least=field.length or None,
+            most=longest,
+            item=self._one(field, name="", unit="", remark=""),
+        )
+
+    def _one(self, field: Field, *, name: str, unit: str, remark: str) -> SkillParameter:
+        """Return a field, or one of its list, as a parameter."""
+        inner = self._inner(field)
+        if inner is not None:
+            fields = tuple(self._parameter(inner, each, unit) for each in inner.fields)
+            kind = ParameterKind.OBJECT
+            return SkillParameter(name=name, kind=kind, description=remark, fields=fields)
+        default = self._book.default(field) if field.default and field.length is None else None
+        least, most = WHOLES.get(field.type, (None, None))
+        if field.type in TEXTS:
+            most = field.most_letters or MOST_TEXT
+        return SkillParameter(
+            name=name,
+            kind=_kind_of(field),
+            description=remark,
+            unit=unit,
+            least=least,
+            most=most,
+            default=default,
+        )
+
+    def _inner(self, field: Field) -> MessageType | None:
+        is_inner = field.is_message or field.type in TIMES
+        return self._book[field.type] if is_inner else None
+
+    def _unit(self, message: MessageType, field: Field, inherited: str) -> str:
+        return UNITS.get(message.name, {}).get(field.name, inherited)
+
+    def _remark(self, message: MessageType, field: Field) -> str:
+        """Return what the definition says beside a field; else the constants, of an only number."""
+        if message.name not in self._remarks:
+            lines = self._book.texts.get(message.name, "").splitlines()
+            found = filter(None, map(REMARK.match, lines))
+            self._remarks[message.name] = {
+                each["name"]: clean_line(each["said"])[:MOST_REMARK] for each in found
+            }
+        said = self._remarks[message.name].get(field.name, "")
+        wholes = [each for each in message.fields if each.type in WHOLES]
+        if not said and message.constants and wholes == [field]:
+            named = ", ".join(f"{name}={value}" for name, value in message.constants.items())
+            return clean_line(named)[:MOST_REMARK]
+        return said
+
+
+def _kind_of(field: Field) -> ParameterKind:
+    if field.type in FLOATS:
+        return ParameterKind.NUMBER
+    if field.type in WHOLES:
+        return ParameterKind.WHOLE
+    return ParameterKind.FLAG if field.type == "bool" else ParameterKind.TEXT

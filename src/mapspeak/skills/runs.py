@@ -1,0 +1,204 @@
+"""Runs of skills in the background, each by its handle: started, awaited, cancelled."""
+
+import logging
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
+
+import anyio
+from anyio.abc import TaskGroup
+
+from mapspeak.errors import LinkError, MapspeakError, SkillError
+from mapspeak.skills.skill import (
+    JsonValue,
+    Skill,
+    SkillCode,
+    SkillOutcome,
+    SkillProgress,
+    SkillState,
+)
+
+MOST_KEPT = 200
+MOST_AT_ONCE = 20
+BEGINS_S = 2.0
+"""Wall time in which a run that cannot be begun says so; nobody is told before that it goes on."""
+
+logger = logging.getLogger(__name__)
+
+OnNews = Callable[["SkillRun"], Awaitable[None]]
+
+
+class SkillRun:
+    """One run of a skill, as far as it has come; kept after its end.
+
+    Attributes:
+        handle: What a model calls it, such as "S1".
+        client: Whose it is; it ends when that client is gone.
+        begun_s: By the event loop's clock, as are all times here.
+        ended_s: None while it goes on.
+        progress: The latest; None as long as nothing was told.
+        outcome: None while it goes on, and where it could not be begun.
+        error: Why it could not be begun.
+    """
+
+    def __init__(self, handle: str, skill: Skill, *, client: str) -> None:
+        self.handle = handle
+        self.skill = skill
+        self.client = client
+        self.begun_s = anyio.current_time()
+        self.ended_s: float | None = None
+        self.progress: SkillProgress | None = None
+        self.n_progress = 0
+        self.outcome: SkillOutcome | None = None
+        self.error: MapspeakError | None = None
+        self._scope = anyio.CancelScope()
+        self._news = anyio.Event()
+
+    @property
+    def is_over(self) -> bool:
+        """True when nothing more will happen."""
+        return self.ended_s is not None
+
+    @property
+    def state(self) -> SkillState:
+        """How it stands."""
+        if self.outcome is not None:
+            return self.outcome.state
+        return SkillState.RUNNING if self.error is None else SkillState.FAILED
+
+    @property
+    def passed_s(self) -> float:
+        """How long it has taken, or took, in wall time."""
+        until_s = anyio.current_time() if self.ended_s is None else self.ended_s
+        return until_s - self.begun_s
+
+    async def do(self, arguments: Mapping[str, JsonValue]) -> None:
+        """Run the skill, and keep what comes of it, whatever that is."""
+        try:
+            with self._scope:
+                self.outcome = await self.skill.run(arguments, self._take_progress)
+            if self.outcome is None:
+                state, code = SkillState.CANCELLED, SkillCode.CANCELLED
+                self.outcome = SkillOutcome(state=state, code=code)
+        except MapspeakError as error:
+            self.error = error
+        except Exception:
+            # One faulty skill must not end all that goes on beside it.
+            logger.exception("The skill %s failed by a mistake in it", self.skill.spec.name)
+            self.outcome = SkillOutcome(state=SkillState.FAILED, code=SkillCode.LOST)
+        finally:
+            self.ended_s = anyio.current_time()
+            self._tell()
+
+    async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
+        """Return at its end, or after so long in wall time; tell of news meanwhile."""
+        with anyio.move_on_after(wait_s):
+            while not self.is_over:
+                news, n_before = self._news, self.n_progress
+                await news.wait()
+                if on_news is not None and self.n_progress != n_before:
+                    await on_news(self)
+
+    async def cancel(self) -> None:
+        """End it, and return when it has ended: nothing of it is left at the robot then."""
+        self._scope.cancel()
+        while not self.is_over:
+            await self._news.wait()
+
+    def _take_progress(self, progress: SkillProgress) -> None:
+        self.progress = progress
+        self.n_progress += 1
+        self._tell()
+
+    def _tell(self) -> None:
+        news, self._news = self._news, anyio.Event()
+        news.set()
+
+
+class SkillRuns:
+    """All runs of one server, the latest last; they go on while `keep_going` runs."""
+
+    def __init__(self) -> None:
+        self._runs: OrderedDict[str, SkillRun] = OrderedDict()
+        self._n_begun = 0
+        self._tasks: TaskGroup | None = None
+
+    @property
+    def under_way(self) -> list[SkillRun]:
+        """The runs that have not ended."""
+        return [run for run in self._runs.values() if not run.is_over]
+
+    async def keep_going(self, work: Callable[[], Awaitable[None]]) -> None:
+        """Let runs go on in the background while some work is done; they end with it."""
+        async with anyio.create_task_group() as tasks:
+            self._tasks = tasks
+            try:
+                await work()
+            finally:
+                self._tasks = None
+                tasks.cancel_scope.cancel()
+
+    async def begin(
+        self,
+        skill: Skill,
+        arguments: Mapping[str, JsonValue],
+        *,
+        client: str = "",
+        wait_s: float,
+        on_news: OnNews | None = None,
+    ) -> SkillRun:
+        """Run a skill, and return when it has ended, or after so long, when it goes on.
+
+        Whoever is cancelled while waiting gives up the run.
+
+        Raises:
+            MapspeakError: It could not be begun.
+        """
+        if self._tasks is None:
+            raise LinkError("No skill can be run: the server is ending.", hint="Start it again.")
+        if len(self.under_way) >= MOST_AT_ONCE:
+            raise SkillError(
+                f"{MOST_AT_ONCE} skills are being run at once.", hint="Wait for one, or cancel it."
+            )
+        self._n_begun += 1
+        run = SkillRun(f"S{self._n_begun}", skill, client=client)
+        self._runs[run.handle] = run
+        self._forget_old()
+        self._tasks.start_soon(partial(run.do, dict(arguments)))
+        try:
+            await run.wait(wait_s=max(wait_s, BEGINS_S), on_news=on_news)
+        except anyio.get_cancelled_exc_class():
+            with anyio.CancelScope(shield=True):
+                await run.cancel()
+            raise
+        if run.error is not None:
+            del self._runs[run.handle]
+            raise run.error
+        return run
+
+    def find(self, handle: str | None) -> SkillRun:
+        """Return a run by its handle; the latest when none is given.
+
+        Raises:
+            SkillError: No run has that handle.
+        """
+        key = next(reversed(self._runs), "") if handle is None else handle.strip().upper()
+        run = self._runs.get(key)
+        if run is None:
+            latest = ", ".join(list(self._runs)[-5:])
+            raise SkillError(
+                f"No run of a skill is called {handle[:40]!r}." if handle else "No skill was run.",
+                hint=f"The latest are {latest}." if latest else "Run one first.",
+            )
+        return run
+
+    async def client_is_gone(self, client: str) -> None:
+        """End the runs of a client that has gone away."""
+        for run in self.under_way:
+            if run.client == client:
+                await run.cancel()
+
+    def _forget_old(self) -> None:
+        over = [run for run in self._runs.values() if run.is_over]
+        for run in over[: max(len(self._runs) - MOST_KEPT, 0)]:
+            del self._runs[run.handle]
