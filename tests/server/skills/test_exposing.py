@@ -1,5 +1,6 @@
 """Topics, services and actions of a robot as tools: found, typed, checked, called, withdrawn."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,22 @@ from mcp_types import ToolListChangedNotification
 
 from bridging import SteppedRobot
 from exposing import NODE, exposed, tool_system, watched
-from fakes import two_rooms
+from fakes import FakeRobot, two_rooms
 from guarding import make_guard
+from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge import RobotAddress, open_client
+from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.rosbridge_server.hub import Topic
 from mapspeak.safety import CommandKind, Patterns, Policy
+from mapspeak.server.tools.ros.goals import open_ros_access
+from mapspeak.server.tools.ros.inquiry import RosInquiry
+from mapspeak.server.tools.skills.board import SkillBoard
+from mapspeak.server.tools.skills.exposing import Exposure
+from mapspeak.session import Session
+from mapspeak.skills.runs import SkillRuns
 from rosserved import QUICK, time_passing
 
 pytestmark = pytest.mark.anyio
@@ -216,3 +226,29 @@ async def test_an_action_is_a_tool_that_is_followed_awaited_and_cancelled(
     assert "cancelled" in cancelled
     assert "over already" in over
     assert robot.pose.x > 2.5
+
+
+async def test_a_robot_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
+    n_asked = 0
+
+    class Absent(RosInquiry):
+        @property
+        def connection(self) -> RosConnection:
+            nonlocal n_asked
+            n_asked += 1
+            raise LinkError("The robot is not there yet.", hint="Wait for it.")
+
+    session = Session(FakeRobot(), SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
+    ros = replace(open_ros_access(session), inquiry=Absent(session))
+    board = SkillBoard(SkillRuns(), others=tuple)
+
+    async def tell() -> None:
+        raise AssertionError("nothing has changed")
+
+    exposure = Exposure(ros, board, ("/tool/*",), tell=tell, every_s=0.0)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(exposure.keep_looking)
+        while n_asked < 3:
+            await anyio.lowlevel.checkpoint()
+        tasks.cancel_scope.cancel()
+    assert not board.skills

@@ -66,11 +66,14 @@ class Exposure:
         self._answers: dict[str, tuple[list[Interface], float]] = {}
 
     async def keep_looking(self) -> None:
-        """Look again and again; a robot out of reach keeps its tools until it is back."""
+        """Look again and again; a robot out of reach keeps its tools until it is back.
+
+        One that was never there has none yet.
+        """
         while True:
-            if self._ros.inquiry.connection.lost_for_s is not None:
-                self.forget()
             with suppress(MapspeakError):
+                if self._ros.inquiry.connection.lost_for_s is not None:
+                    self.forget()
                 await self.look()
             await anyio.sleep(self._every_s)
 
