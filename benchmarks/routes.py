@@ -17,10 +17,12 @@ import numpy as np
 from benchmarks.figure import Figure
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, away
+from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan, plan_route
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.recollection import RememberedPlace
 
 __all__ = ["measure"]
 
@@ -28,6 +30,9 @@ KINDS = ("extinguisher", "printer", "bench", "socket")
 N_PLACES = 12
 N_ROUTES = 50
 N_STOPS = (3, 5)
+N_ORDERED = (7, 12)
+N_ORDERS = 10
+MOST_BRUTE = 7
 LEAST_DETOUR_M = 1.0
 SAME_RATIO, SAME_M = 0.01, 0.1
 """Two computations of one path differ by no more than this."""
@@ -80,6 +85,55 @@ def measure() -> Iterator[Figure]:
     yield Figure(name="as short as brute force", value=n_right, unit="routes")
     yield Figure(name="saved against greedy choice, mean", value=saved_m / n_all, unit="m")
     yield Figure(name="one plan, median", value=sorted(took_ms)[len(took_ms) // 2], unit="ms")
+    for n_stops in N_ORDERED:
+        yield from _measure_orders(sites, n_stops)
+
+
+def _measure_orders(sites: Sequence[Site], n_stops: int) -> Iterator[Figure]:
+    """Compare the whole ways past drawn stops: ordered, as given, by the nearest, and the best."""
+    ordered_m, given_m, nearest_m, best_m, took_ms = 0.0, 0.0, 0.0, 0.0, []
+    for world, ways, generator in map(_prepare, sites):
+        reached = [n for n, place in enumerate(world.places, 1) if _is_reached(world, place)]
+        for _ in range(N_ORDERS if len(reached) >= n_stops else 0):
+            numbers = [int(n) for n in generator.choice(reached, n_stops, replace=False)]
+            stops = [f"W{number}" for number in numbers]
+            started_s = time.process_time()
+            plan = plan_route(world, stops, order=RouteOrder.SHORTEST)
+            took_ms.append(1e3 * (time.process_time() - started_s))
+            ordered_m += ways.length_m([int(each.goal.name[1:]) for each in plan.stops])
+            given_m += ways.length_m(numbers)
+            nearest_m += ways.length_m(_order_by_nearest(ways, numbers))
+            if n_stops <= MOST_BRUTE:
+                best_m += min(map(ways.length_m, itertools.permutations(numbers)))
+    name = f"{n_stops} stops"
+    yield Figure(name=f"{name}: ordered, of the way as given", value=ordered_m / given_m, unit="")
+    yield Figure(name=f"{name}: by the nearest each time", value=nearest_m / given_m, unit="")
+    if best_m:
+        yield Figure(name=f"{name}: ordered, of the best", value=ordered_m / best_m, unit="")
+    yield Figure(
+        name=f"{name}: a plan, median", value=sorted(took_ms)[len(took_ms) // 2], unit="ms"
+    )
+
+
+def _is_reached(world: WorldModel, place: RememberedPlace) -> bool:
+    return world.path_m(place.waypoint.pose.point) is not None
+
+
+def _prepare(site: Site) -> tuple[WorldModel, Ways, np.random.Generator]:
+    generator = np.random.default_rng(77)
+    truth = Truth(site)
+    poses, kinds = _spread(truth, generator)
+    site = replace(site, memory=_remember(poses, kinds))
+    world = WorldModel(site.grid, site.robot, site.memory, radius_m=site.radius_m)
+    return world, Ways(truth, [site.robot.point, *(pose.point for pose in poses)]), generator
+
+
+def _order_by_nearest(ways: Ways, numbers: Sequence[int]) -> list[int]:
+    ahead, order = list(numbers), [0]
+    while ahead:
+        order.append(ways.nearest(order[-1], ahead))
+        ahead.remove(order[-1])
+    return order[1:]
 
 
 def _judge_site(site: Site, *, seed: int, n_wanted: int) -> Iterator[tuple[bool, Case, float]]:

@@ -226,3 +226,58 @@ async def test_an_ambiguous_phrase_is_answered_with_the_candidates(tmp_path: Pat
     assert result.is_error
     assert "T1 at " in text_of(result)
     assert "T2 at " in text_of(result)
+
+
+async def test_stops_are_driven_past_on_the_shortest_way_where_asked(tmp_path: Path) -> None:
+    stops = ["6, 1.4", "2.0, 1.4", "4.5, 1.4"]
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        given = {"stops": stops, "order": "shortest"}
+        answer = report_of(await client.call_tool("follow_route", given))
+    assert answer["done"] == ["(2.00, 1.40)", "(4.50, 1.40)", "(6.00, 1.40)"]
+    assert answer["total_m"] == pytest.approx(4.5, abs=0.3)
+    assert answer["as_given_m"] > answer["total_m"] + 4.0
+
+
+async def test_a_route_ends_where_it_is_wanted_to_whatever_the_order(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        given = {"stops": ["6, 1.4", "2.5, 1.4"], "order": "shortest", "end_at": "start"}
+        answer = report_of(await client.call_tool("follow_route", given))
+    assert answer["done"][-1] == "start"
+    assert (answer["robot"]["x"], answer["robot"]["yaw_deg"]) == (1.5, 0.0)
+    assert len(robot.goals) == 3
+
+
+async def test_all_rooms_are_driven_past_and_looked_around_in(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    n_pictures, done = [], []
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        given = {"stops": ["all rooms"], "order": "shortest", "look_around": True}
+        result = await client.call_tool("follow_route", given)
+        while report_of(result)["state"] == "at_stop":
+            n_pictures.append(len(pictures_of(result)))
+            result = await client.call_tool("follow_route", {})
+        done = report_of(result)["done"]
+    assert n_pictures == [5, 5], "of 90 degrees each, overlapping"
+    assert sorted(done) == ["R1", "R2"]
+
+
+async def test_a_stop_while_it_looks_around_ends_it_there(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        given = {"stops": ["R1", "R2"], "look_around": True}
+        await client.call_tool("follow_route", given)
+        n_goals = len(robot.goals)
+        await client.call_tool("stop_robot", {})
+        assert len(robot.goals) == n_goals
+        waited = report_of(await client.call_tool("wait_for_goal", {"wait_s": 1}))
+    assert waited["state"] != "driving"
+
+
+async def test_an_end_that_nobody_knows_is_an_error_before_anything_moves(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("follow_route", {"stops": ["R2"], "end_at": "R77"})
+    assert result.is_error
+    assert "R77" in text_of(result)
+    assert not robot.goals

@@ -13,6 +13,7 @@ import anyio
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.trips import TripContext
+from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan, StopState, plan_route
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose
@@ -78,21 +79,34 @@ class RouteBook:
         self._is_looking = False
         self._advancing = anyio.Lock()
 
-    async def begin(self, stops: Sequence[str], *, pause_s: float, is_looking: bool) -> None:
-        """Plan a route that takes the place of the one before.
+    async def begin(
+        self,
+        stops: Sequence[str],
+        *,
+        pause_s: float,
+        is_looking: bool,
+        order: RouteOrder = RouteOrder.AS_GIVEN,
+        end_at: str | None = None,
+    ) -> RoutePlan:
+        """Plan a route that takes the place of the one before, and return it.
 
         Args:
             is_looking: A call ends at each stop, so that somebody can look.
+            order: Whether stops are driven past as they are given, or on the shortest way.
+            end_at: A last stop, whatever the order; "start" is where the robot is now.
 
         Raises:
             GoalError: There is no such place, or no way there.
         """
         world = await self._site.fetch_world_model()
-        plan = await self._site.compute(lambda: plan_route(world, stops))
+        plan = await self._site.compute(
+            lambda: plan_route(world, stops, order=order, end_at=end_at)
+        )
         async with self._advancing:
             await self._give_up()
             self._plan = plan
             self._pause_s, self._is_looking, self._pause_until_s = pause_s, is_looking, None
+        return plan
 
     async def advance(
         self, *, wait_s: float, when_blocked: WhenBlocked, on_progress: OnProgress, client: str = ""

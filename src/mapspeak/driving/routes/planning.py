@@ -7,17 +7,21 @@ from enum import StrEnum
 
 import numpy as np
 
+from mapspeak.driving.routes.ordering import RouteOrder, order_shortest
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import GoalCheck, say_refusal
-from mapspeak.places.naming import AmbiguousPlaceError, Place
+from mapspeak.places.naming import AmbiguousPlaceError, Place, Spot
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_group, find_place
 from mapspeak.places.relations.grammar import Superlative, parse_relation
 from mapspeak.places.relations.superlatives import find_all_near
 from mapspeak.robot import GoalStatus
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel
 
+START = "start"
+"""What the place is called where a route begins."""
 MOST_CANDIDATES = 12
 LEAST_SAID_RATIO = 0.75
 """Of words that are no name, so much must be said of what they are taken for."""
@@ -124,11 +128,14 @@ class RoutePlan:
 
     Attributes:
         greedy_m: The whole length if the nearest candidate were taken each time.
+        as_given_m: The whole length in the order in which the stops were given; None where that is
+            their order, or the route ends elsewhere.
         left_out: Of "all rooms" and the like, those that the robot cannot get to.
     """
 
     stops: tuple[RouteStop, ...]
     greedy_m: float
+    as_given_m: float | None = None
     left_out: tuple[RouteStop, ...] = ()
 
     @property
@@ -137,10 +144,20 @@ class RoutePlan:
         return math.fsum(stop.leg_m for stop in self.stops)
 
 
-def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
-    """Plan a route past stops in their order, each an id, a name, "x, y" or other words.
+def plan_route(
+    world: WorldModel,
+    stops: Sequence[str],
+    *,
+    order: RouteOrder = RouteOrder.AS_GIVEN,
+    end_at: str | None = None,
+) -> RoutePlan:
+    """Plan a route past stops, each an id, a name, "x, y" or other words.
 
-    The places of "all rooms" and the like follow one another as they are nearest.
+    The places of "all rooms" and the like follow one another on the shortest way past them.
+
+    Args:
+        order: Whether the stops are driven past as they are given, or on the shortest way.
+        end_at: A last stop, whatever the order; "start" is where the robot is now.
 
     Raises:
         GoalError: There are no stops or too many, one means nothing that can be reached, or no way
@@ -149,7 +166,13 @@ def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
     _require_number(len(stops))
     legs_m = _Legs(world)
     asked, left_out = _spread(world, legs_m, stops)
-    _require_number(len(asked))
+    as_given_m = math.fsum(legs_m.along(_choose_shortest(legs_m, asked)))
+    last = [] if end_at is None else [_find_end(world, end_at)]
+    _require_number(len(asked) + len(last))
+    if order is RouteOrder.SHORTEST:
+        asked = _reorder(legs_m, [*asked, *last], is_end_fixed=bool(last))
+    else:
+        asked = [*asked, *last]
     chosen = _choose_shortest(legs_m, asked)
     legs = zip(asked, chosen, legs_m.along(chosen), strict=True)
     return RoutePlan(
@@ -158,6 +181,7 @@ def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
             for (words, candidates), goal, leg_m in legs
         ),
         greedy_m=math.fsum(legs_m.along(_choose_greedily(legs_m, asked))),
+        as_given_m=as_given_m if order is RouteOrder.SHORTEST and not last else None,
         left_out=left_out,
     )
 
@@ -183,11 +207,33 @@ def _spread(
             asked.append((words, _find(world, number, words)))
             continue
         left_out += [_leave_out(goal) for goal in group if not goal.check.is_ok]
-        while ahead:
-            way = asked[-1][1][:1] if asked else ()
-            nearest = ahead.pop(int(np.argmin([legs_m.between(way, goal) for goal in ahead])))
-            asked.append((nearest.name, (nearest,)))
+        way = asked[-1][1][:1] if asked else ()
+        table = legs_m.table(way, ahead)
+        shortest = order_shortest(table, is_end_fixed=False)
+        asked += [(ahead[index].name, (ahead[index],)) for index in shortest]
     return asked, tuple(left_out)
+
+
+def _reorder(legs_m: "_Legs", asked: list[Asked], *, is_end_fixed: bool) -> list[Asked]:
+    """Return stops on the shortest way past the likeliest meaning of each.
+
+    Which of several places a stop means is chosen afterwards, and then the order once more.
+    """
+    meant = [candidates[0] for _, candidates in asked]
+    for _ in range(2):
+        table = legs_m.table((), meant)
+        order = order_shortest(table, is_end_fixed=is_end_fixed)
+        asked = [asked[index] for index in order]
+        meant = list(_choose_shortest(legs_m, asked))
+    return asked
+
+
+def _find_end(world: WorldModel, words: str) -> Asked:
+    """Return the last stop of a route."""
+    if words.strip().casefold() == START:
+        here = Place(START, Spot(world.robot.point, world.robot.yaw_rad))
+        return START, (check_place(world, here),)
+    return words, find_candidates(world, words)
 
 
 def _leave_out(goal: CheckedGoal) -> RouteStop:
@@ -256,6 +302,11 @@ class _Legs:
         """Return the metres from the end of a way, the robot where it is empty, to a candidate."""
         found_m = self._field(way).distance_to(goal.pose.point)
         return math.inf if found_m is None else found_m
+
+    def table(self, way: tuple[CheckedGoal, ...], goals: Sequence[CheckedGoal]) -> FloatArray:
+        """Return the metres from the end of a way, and from each goal, to each goal."""
+        starts = [way, *((goal,) for goal in goals)]
+        return np.array([[self.between(start, goal) for goal in goals] for start in starts])
 
     def along(self, way: tuple[CheckedGoal, ...]) -> tuple[float, ...]:
         """Return the metres of each leg."""

@@ -40,6 +40,7 @@ class RouteAnswer(Report):
     greedy_m: float | None = Field(
         description="the total if the nearest candidate were taken each time, where that is more"
     )
+    as_given_m: float | None = Field(description="the total in the order given, where that is more")
     robot: PoseReport
     pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
     next_step: str
@@ -64,6 +65,7 @@ class RouteAnswer(Report):
             legs_m=[round(stop.leg_m, 1) for stop in plan.stops],
             total_m=round(plan.total_m, 1),
             greedy_m=round(plan.greedy_m, 1) if _is_better(plan) else None,
+            as_given_m=None if plan.as_given_m is None else round(plan.as_given_m, 1),
             robot=PoseReport.of(progress.pose),
             pose_uncertain=say_pose_doubt(progress.pose_doubt),
             next_step=lead(NEXT_STEP[progress.state]),

@@ -1,13 +1,15 @@
 """The tool that follows a route: several places in order, planned as a whole."""
 
-import base64
+from collections.abc import Sequence
 from typing import Annotated
 
-from mcp.server.mcpserver import Context
-from mcp_types import CallToolResult, ImageContent, TextContent
+from mcp.server.mcpserver import Context, Image
+from mcp_types import CallToolResult, ContentBlock, ImageContent, TextContent
 from pydantic import Field
 
 from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
+from mapspeak.driving.routes.ordering import RouteOrder
+from mapspeak.driving.routes.planning import RoutePlan
 from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.routes import RouteAnswer
 from mapspeak.server.text.wording import shorten
@@ -17,7 +19,8 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
-from mapspeak.server.tools.sightings import CameraSighting, look_ahead
+from mapspeak.server.tools.drive import MOST_PICTURES, ViewTools
+from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
@@ -28,12 +31,17 @@ ERRAND_S = 1800.0
 Stops = Annotated[
     list[Annotated[str, Field(min_length=1, max_length=200)]] | None,
     Field(
-        description='in order: ids, names, points or phrases: "all rooms", "every extinguisher"; '
+        description='ids, names, points or phrases: "all rooms", "every extinguisher"; '
         "left out to go on",
         max_length=MOST_STOPS,
     ),
 ]
+Order = Annotated[RouteOrder, Field(description="of the stops: as given, or on the shortest way")]
+EndAt = Annotated[
+    str | None, Field(description='a last stop, such as "start", where it is now', max_length=200)
+]
 Look = Annotated[bool, Field(description="answer with a picture at each stop")]
+Around = Annotated[bool, Field(description="with pictures to all sides instead")]
 Pause = Annotated[float, Field(description="seconds to stand at each stop", ge=0, le=600)]
 Blocked = Annotated[
     WhenBlocked, Field(description="a stop that cannot be reached: wait for you, or skip it")
@@ -52,6 +60,8 @@ class RouteTools:
         self._session = session
         self._routes = RouteBook(session)
         self._errand = Errand(what="follow a route", n_drives=0, duration_s=ERRAND_S)
+        self._looks_around = False
+        self._views = ViewTools(session)
 
     @tool(
         "Follow a route",
@@ -63,21 +73,30 @@ class RouteTools:
         self,
         context: Context,
         stops: Stops = None,
+        order: Order = RouteOrder.AS_GIVEN,
+        end_at: EndAt = None,
         look: Look = False,  # noqa: FBT002 - tools are called by name
+        look_around: Around = False,  # noqa: FBT002 - tools are called by name
         pause_s: Pause = 0.0,
         when_blocked: Blocked = WhenBlocked.WAIT,
         wait_s: Wait = 20.0,
     ) -> Annotated[CallToolResult, RouteAnswer]:
-        """Drive the robot past several places in order, on the shortest way as a whole.
+        """Drive the robot past several places, as given or on the shortest way.
 
         Words that fit several places ("the extinguisher") are taken where the whole route is
         shortest. It sets out to the next stop only while it is called: call it again without stops
         to go on.
         """
         if stops is not None:
-            await self._routes.begin(stops, pause_s=pause_s, is_looking=look)
-            past = f"drive past {'; '.join(shorten(each) for each in stops)}"
-            self._errand = Errand(what=past, n_drives=len(stops), duration_s=ERRAND_S)
+            plan = await self._routes.begin(
+                stops,
+                pause_s=pause_s,
+                is_looking=look or look_around,
+                order=order,
+                end_at=end_at,
+            )
+            self._looks_around = look_around
+            self._errand = _errand_of(stops, plan, looks_around=look_around)
         with on_errand(self._errand):
             progress = await self._routes.advance(
                 wait_s=wait_s,
@@ -85,23 +104,30 @@ class RouteTools:
                 on_progress=tell_progress(context),
                 client=client_of(context),
             )
-        robot = self._session.robot
-        sees = progress.state is RouteState.AT_STOP and robot.description.has_camera
-        return _answer(
-            RouteAnswer.of(progress),
-            await look_ahead(self._session) if sees else None,
-        )
+            robot = self._session.robot
+            sees = progress.state is RouteState.AT_STOP and robot.description.has_camera
+            shown = await self._look(context) if sees else []
+        report = RouteAnswer.of(progress)
+        text = TextContent(type="text", text=report.model_dump_json())
+        content: list[ContentBlock] = [text, *map(_as_content, shown)]
+        return CallToolResult(content=content, structured_content=report.model_dump(mode="json"))
+
+    async def _look(self, context: Context) -> list[str | Image]:
+        if self._looks_around:
+            return await self._views.look_around(context)
+        sighting = await look_ahead(self._session)
+        return [sighting.text, sighting.image]
 
 
-def _answer(report: RouteAnswer, sighting: CameraSighting | None) -> CallToolResult:
-    """Return the report as text and data, and what the camera sees with it."""
-    content: list[TextContent | ImageContent] = [
-        TextContent(type="text", text=report.model_dump_json())
-    ]
-    if sighting is not None:
-        data = base64.b64encode(sighting.picture.data).decode()
-        content += [
-            TextContent(type="text", text=sighting.text),
-            ImageContent(type="image", data=data, mime_type=sighting.picture.media_type),
-        ]
-    return CallToolResult(content=list(content), structured_content=report.model_dump(mode="json"))
+def _errand_of(stops: Sequence[str], plan: RoutePlan, *, looks_around: bool) -> Errand:
+    """Return what a person agrees to: the drives to all stops, and the turns at them."""
+    past = f"drive past {'; '.join(shorten(each) for each in stops)}"
+    what = f"{past} and look around at each" if looks_around else past
+    n_turns = MOST_PICTURES if looks_around else 0
+    return Errand(what=what, n_drives=len(plan.stops) * (1 + n_turns), duration_s=ERRAND_S)
+
+
+def _as_content(shown: str | Image) -> TextContent | ImageContent:
+    if isinstance(shown, str):
+        return TextContent(type="text", text=shown)
+    return shown.to_image_content()
