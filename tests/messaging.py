@@ -36,9 +36,8 @@ def _one_of(book: TypeBook, field: Field) -> st.SearchStrategy[Any]:
         letters = st.characters(exclude_characters="\x00", codec="utf-8")
         return st.text(letters, max_size=min(field.most_letters or MOST_LETTERS, MOST_LETTERS))
     if field.type in FLOATS:
-        return st.floats(
-            allow_nan=False, allow_infinity=False, width=32 if field.type == "float32" else 64
-        )
+        most = float(np.finfo(field.type).max)
+        return st.floats(-most, most, width=32 if field.type == "float32" else 64)
     low, high = UNSIGNED.get(field.type, WHOLES.get(field.type, (0, 0)))
     return st.integers(low, high)
 

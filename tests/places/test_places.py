@@ -7,9 +7,14 @@ from drawing import grid_from_text
 from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory import SemanticMap, Waypoint
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.places.naming import Place, Spot, is_taken_name
-from mapspeak.places.relations.choosing import check_place, choose_goal, find_place
+from mapspeak.places.relations.choosing import (
+    check_place,
+    choose_goal,
+    find_place,
+    find_places,
+)
 from mapspeak.places.ways import find_way
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
@@ -205,3 +210,57 @@ def test_the_nearest_pose_of_a_point_in_a_wall_is_come_to_straight_on() -> None:
     nearest = check_place(world, find_place(world, "4.75, -0.1")).check.nearest
     assert nearest is not None
     assert nearest.yaw_deg == pytest.approx(-75, abs=25)
+
+
+CHARGERS = (
+    ("a", 1.0, "charger 1", 0.0),
+    ("b", 2.2, "charger 2", math.pi / 2),
+    ("c", 4.5, "charger", math.pi / 2),
+)
+
+
+def world_of_chargers() -> WorldModel:
+    waypoints = tuple(
+        Waypoint(
+            name=name,
+            pose=Pose(x, 1.4),
+            functional_landmarks=(Landmark(label=label, bearing_rad=bearing_rad, range_m=0.8),),
+        )
+        for name, x, label, bearing_rad in CHARGERS
+    )
+    return WorldModel(two_rooms(), Pose(1.5, 1.4), SemanticMap(waypoints=waypoints), radius_m=0.2)
+
+
+@pytest.mark.parametrize(
+    ("words", "labels"),
+    [
+        ("nearest charger", ["charger 1"]),
+        ("the second-nearest charger", ["charger 2"]),
+        ("the farthest charger", ["charger"]),
+        ("second farthest charger", ["charger 2"]),
+        ("charger 2", ["charger 2"]),
+        ("the two nearest chargers", ["charger 1", "charger 2"]),
+        ("the two farthest chargers", ["charger", "charger 2"]),
+    ],
+)
+def test_of_numbered_things_the_one_in_the_order_asked_for_is_meant(
+    words: str, labels: list[str]
+) -> None:
+    found = find_places(world_of_chargers(), words)
+    assert [each.thing.thing.label for each in found] == labels  # type: ignore[union-attr]
+
+
+def test_every_thing_of_a_name_is_meant_whether_it_is_numbered_or_not() -> None:
+    assert len(find_places(world_of_chargers(), "every charger")) == 3
+    assert len(find_places(world_of_chargers(), "all remembered chargers")) == 3
+
+
+def test_how_far_the_nearest_is_and_of_how_many_is_told() -> None:
+    found = find_place(world_of_chargers(), "nearest charger")
+    assert found.reason.endswith("m by path, of 3")
+
+
+@pytest.mark.parametrize("words", ["fourth-nearest charger", "the four nearest chargers"])
+def test_more_things_than_there_are_is_an_error(words: str) -> None:
+    with pytest.raises(GoalError, match="can be reached"):
+        find_places(world_of_chargers(), words)

@@ -14,8 +14,9 @@ from mapspeak.memory import Landmark, Waypoint
 from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import GoalCheck, judge_goal
-from mapspeak.places.naming import Place, find_elsewhere, split_room
+from mapspeak.places.naming import Place, find_elsewhere
 from mapspeak.places.relations.choosing import stand_at
+from mapspeak.places.things import split_room
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
 

@@ -4,8 +4,9 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore
 from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_views, view_of
-from mapspeak.places.naming import AmbiguousPlaceError, find_things
+from mapspeak.places.naming import AmbiguousPlaceError
 from mapspeak.places.recall.nearby import THING_ID
+from mapspeak.places.things import find_things
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 

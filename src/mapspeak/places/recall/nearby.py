@@ -4,8 +4,9 @@ import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from mapspeak.places.naming import find_things, no_such_place
+from mapspeak.places.naming import no_such_place
 from mapspeak.places.recall.asking import last_seen
+from mapspeak.places.things import find_things
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
 

@@ -7,16 +7,7 @@ from enum import StrEnum
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.places.goalcheck import GoalCheck, check_goal, say_refusal
-from mapspeak.places.naming import (
-    Place,
-    Spot,
-    find_named,
-    find_thing,
-    is_taken_name,
-    no_such_place,
-    place_of,
-    say_spot,
-)
+from mapspeak.places.naming import Place, Spot, find_named, is_taken_name, no_such_place, say_spot
 from mapspeak.places.relations.relating import find_related, find_several_related
 from mapspeak.places.standing import (
     arrival_pose,
@@ -25,6 +16,7 @@ from mapspeak.places.standing import (
     facing_in,
     stand_before,
 )
+from mapspeak.places.things import find_thing, place_of
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel

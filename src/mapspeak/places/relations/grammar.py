@@ -9,8 +9,8 @@ from mapspeak.places.relations.vocabulary import (
     DISTANCE,
     GAP,
     ORDER,
+    ORDERS,
     RANK,
-    RANKS,
     Compass,
     Kind,
     Order,
@@ -22,6 +22,7 @@ from mapspeak.places.relations.vocabulary import (
     read_distance,
     read_order,
 )
+from mapspeak.places.things import RANKS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -261,6 +262,7 @@ def _read_all(kind: Kind) -> Read:
     return lambda match: Several(kind=kind, at=match["at"])
 
 
+WAY_ORDER = rf"(?P<order>{ORDERS[Order.NEAREST]}|{ORDERS[Order.FARTHEST]})"
 ALL = r"(?:all|every|each)(?: of)?(?: the)?"
 TOWARDS = r"(?:at|through|to|towards)"
 LOOKING = rf"(?:facing|looking (?:back )?{TOWARDS})"
@@ -316,6 +318,15 @@ FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
     *(
         (pattern(rf"{ALL} (?:{words})s?(?: (?:of|in) (?P<at>.+))?"), _read_all(kind))
         for kind, words in KINDS.items()
+    ),
+    (
+        pattern(rf"{THE}{COUNT} {WAY_ORDER} (?P<label>.+?)(?: (?:to|from) (?P<at>.+))?"),
+        lambda m: Several(
+            label=m["label"],
+            order=read_order(m["order"]),
+            count=read_count(m["count"]),
+            at=m["at"],
+        ),
     ),
     (
         pattern(rf"{ALL} (?:(?:remembered|known) )?(?P<label>.+)"),

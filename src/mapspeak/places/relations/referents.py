@@ -17,13 +17,13 @@ from mapspeak.places.naming import (
     Place,
     Spot,
     find_named,
-    find_place_ids,
     say_spot,
 )
 from mapspeak.places.relations.outlines import find_sides
 from mapspeak.places.relations.placement import refuse
 from mapspeak.places.relations.vocabulary import GAP, pattern, plain
 from mapspeak.places.standing import point_ahead
+from mapspeak.places.things import find_place_ids
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Door, Region, RoomClass

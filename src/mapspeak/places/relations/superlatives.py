@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.memory import name_key
-from mapspeak.places.naming import MOST_NAMED, AmbiguousPlaceError, Place, split_room
+from mapspeak.places.naming import MOST_NAMED, AmbiguousPlaceError, Place
 from mapspeak.places.relations.grammar import Several, Superlative
 from mapspeak.places.relations.placement import refuse
 from mapspeak.places.relations.referents import ROBOT, Referent
 from mapspeak.places.relations.vocabulary import Kind, Order, say_order
-from mapspeak.places.standing import cells_of
+from mapspeak.places.standing import cells_of, stand_before
+from mapspeak.places.things import list_alike
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.recollection import RememberedPlace
 
 Sized = Region | Door | Frontier
 
@@ -82,7 +82,7 @@ def find_several(world: WorldModel, words: Several, at: Referent | None) -> tupl
         GoalError: There are too few, or it has no meaning where they are asked for.
     """
     if words.kind is None:
-        return tuple(Place(each.id, each) for each in _find_all_called(world, words.label))
+        return _find_called(world, words, at)
     if words.count is None:
         found = [each for each in _list_all(world, words.kind) if _is_at(world, each, at)]
         if not found:
@@ -100,17 +100,24 @@ def find_several(world: WorldModel, words: Several, at: Referent | None) -> tupl
     return tuple(each.place for each in ranked[: words.count])
 
 
-def _find_all_called(world: WorldModel, words: str) -> list[RememberedThing]:
-    """Find things by their name or its end: "extinguishers" are fire extinguishers too."""
-    label, room_id = split_room(world, words)
-    called = world.recollection.find_called(label)
-    end = f" {name_key(label).removesuffix('s')}"
-    return [
-        each
-        for each in world.things
-        if each in called or f" {name_key(each.thing.label).removesuffix('s')}".endswith(end)
-        if room_id is None or room_id in world.rooms_before(each)
-    ]
+def _find_called(world: WorldModel, words: Several, at: Referent | None) -> tuple[Place, ...]:
+    """Find all things of a name, or the first of them by the way there; () for an unused name."""
+    called = list_alike(world, words.label)
+    if words.count is None or not called:
+        return tuple(Place(each.id, each) for each in called)
+    distances = world.distances if at is None else world.map.distances_from(at.anchor)
+    ways = [(distances.distance_to(stand_before(world, each).point), each) for each in called]
+    sign = -1 if words.order is Order.FARTHEST else 1
+    reached = sorted(
+        ((sign * way_m, each) for way_m, each in ways if way_m is not None),
+        key=lambda found: found[0],
+    )
+    if words.count > len(reached):
+        raise refuse(
+            f"Only {len(reached)} things called {words.label!r} can be reached.",
+            [each.id for _, each in reached[:MOST_NAMED]],
+        )
+    return tuple(Place(each.id, each) for _, each in reached[: words.count])
 
 
 def require_one(words: str, found: Sequence[Place]) -> Place:

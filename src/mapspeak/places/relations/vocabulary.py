@@ -5,6 +5,7 @@ import re
 from enum import StrEnum
 
 from mapspeak.places.naming import NUMBER
+from mapspeak.places.things import RANKS
 
 
 class Side(StrEnum):
@@ -126,7 +127,6 @@ ORDERS = {
     Order.LARGEST: "largest|biggest|widest",
 }
 ORDER = rf"(?P<order>{'|'.join(ORDERS.values())})"
-RANKS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 RANK = rf"(?:(?P<rank>{'|'.join(RANKS)}) )?"
 COUNT = rf"(?P<count>[2-9]|1\d|{'|'.join(COUNTS[2:])})"
 

@@ -8,9 +8,9 @@ from pydantic import Field
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.memory.search.answer import EntryKind
-from mapspeak.places.naming import split_room
 from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import find_place
+from mapspeak.places.things import split_room
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.moments import read_past
