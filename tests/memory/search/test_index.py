@@ -452,3 +452,29 @@ def test_an_exact_name_always_wins(
     assert "named" in {candidate.entry.id for candidate in meant}
     assert {candidate.entry.name for candidate in meant} == {name}
     assert {candidate.score_ratio for candidate in meant} == {1.0}
+
+
+DENYING = SemanticMap(
+    waypoints=(
+        Waypoint(name="corner", pose=HERE, description="An empty corner, no bin here."),
+        Waypoint(name="hall", pose=HERE, description="A hall without a sink or a mirror."),
+        Waypoint(name="copies", pose=HERE, description="There is no printer, but a plotter."),
+        Waypoint(
+            name="no entry",
+            pose=HERE,
+            safety_landmarks=(Landmark(label="no smoking sign", note="Without it people smoke."),),
+        ),
+    )
+)
+
+
+@pytest.mark.parametrize("absent", ["bin", "sink", "mirror", "printer"])
+def test_what_a_description_says_is_not_there_is_not_found_by_it(absent: str) -> None:
+    answer = EntryIndex(list_entries(DENYING)).find(absent)
+    assert answer.verdict is Verdict.NOT_REMEMBERED
+    assert not answer.candidates
+
+
+@pytest.mark.parametrize("there", ["plotter", "empty corner", "no entry", "no smoking sign"])
+def test_what_it_says_is_there_is_found_and_names_are_taken_as_they_are(there: str) -> None:
+    assert EntryIndex(list_entries(DENYING)).find(there).candidates

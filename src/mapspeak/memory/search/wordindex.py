@@ -52,6 +52,23 @@ def split_words(text: str) -> Iterator[tuple[str, str]]:
         yield shown, shown.lower() if shown.isascii() else without_accents(shown)
 
 
+SENTENCES = frozenset(
+    {MatchField.DESCRIPTION, MatchField.FEATURE, MatchField.NOTE, MatchField.PLACE}
+)
+"""What people wrote in sentences; "no entry" may be a name."""
+_DENIED = re.compile(
+    r"\b(?:no|without|neither|nor) (?:(?:an?|any|the|other) )?[^\W\d]\w*(?: (?!or\b)[^\W\d]\w*)?"
+    r"(?: or (?:an? |any )?[^\W\d]\w*)*",
+    re.IGNORECASE,
+)
+"""What is said not to be there: "no bin", "without a sink or a mirror"."""
+
+
+def _without_denied(field: MatchField, text: str) -> str:
+    """Return a text without what it says is not there: that is not found by it."""
+    return _DENIED.sub(" ", text) if field in SENTENCES else text
+
+
 def without_accents(word: str) -> str:
     """Return a text in small letters without accents."""
     letters = unicodedata.normalize("NFKD", word.casefold())
@@ -200,9 +217,10 @@ class WordIndex:
         words_of: dict[str, list[str]] = {}
         for number, texts in enumerate(records):
             for field, text in texts:
-                if text not in words_of:
-                    words_of[text] = [word for _, word in split_words(text)]
-                for word in words_of[text]:
+                said = _without_denied(field, text)
+                if said not in words_of:
+                    words_of[said] = [word for _, word in split_words(said)]
+                for word in words_of[said]:
                     least = weights[word].get(number, 0.0)
                     weights[word][number] = max(least, FIELD_WEIGHTS[field])
         self._postings = {
@@ -251,7 +269,7 @@ class WordIndex:
                 kind=asked.spellings[compared],
             )
             for field, text in self._records[number]
-            for shown, compared in split_words(text)
+            for shown, compared in split_words(_without_denied(field, text))
             if compared in asked.spellings
         )
         return max(findings, key=lambda finding: finding.weight, default=None)
