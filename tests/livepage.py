@@ -95,13 +95,14 @@ async def serve_live(
     *,
     guard: Guard | None = None,
     toolsets: tuple[str, ...] = DEFAULT_TOOLSETS,
+    session_type: type[Session] = Session,
 ) -> AsyncGenerator[Live]:
     """Serve a robot to a client, and its live page."""
     address = find_free_address()
     robot = robot or FakeRobot(two_rooms())
     guard = guard or make_guard(folder)
     store = SemanticMapStore(folder / "m.yaml", map_id="two-rooms")
-    session = Session(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
+    session = session_type(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
     calls, tokens, is_ready = CallFeed(), list[str](), anyio.Event()
     feeds = {"": ViewFeed(session, calls)}
     with anyio.fail_after(PATIENCE_S):

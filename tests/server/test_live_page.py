@@ -1,6 +1,7 @@
 """The live page: what a browser is told, and what a person may do from it."""
 
 import io
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from mapspeak.errors import ConfigError, LinkError
 from mapspeak.robot import StampedPose
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.server.view.serving import serve_view
+from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
 
@@ -153,6 +155,34 @@ async def test_a_person_with_the_token_drives_and_the_log_says_who(tmp_path: Pat
         (goal,) = live.robot.goals.values()
     assert (goal.x, goal.y) == (3.0, 1.0)
     assert {line.client for line in audit_of(tmp_path)} == {"a person at the live page"}
+
+
+class Listening(Session):
+    """Counts how often somebody is heard."""
+
+    n_heard = 0
+
+    def client_is_heard(self) -> AbstractContextManager[None]:
+        self.n_heard += 1
+        return super().client_is_heard()
+
+
+async def test_an_open_page_is_somebody_who_is_there_for_its_own_drive_alone(
+    tmp_path: Path,
+) -> None:
+    async with serve_live(tmp_path, session_type=Listening) as live, live.hear() as events:
+        assert isinstance(live.session, Listening)
+        await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0, "wait_s": 0})
+        n_before = live.session.n_heard
+        for _ in range(3):
+            await next_of(events, "alive")
+        assert live.session.n_heard == n_before
+        await live.unlock()
+        await live.command("drive", x=2.0, y=1.0)
+        n_before = live.session.n_heard
+        await next_of(events, "alive")
+        await next_of(events, "alive")
+        assert live.session.n_heard >= n_before + 3
 
 
 async def test_a_click_into_a_wall_is_answered_with_why_and_with_what_works(

@@ -14,6 +14,7 @@ from mapspeak.geometry import Pose
 from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.wording import say_pose_doubt
 from mapspeak.server.view.calls import CallFeed, CallView
+from mapspeak.server.view.commands import PERSON
 from mapspeak.server.view.document import GridView, Overlay, PoseView, ViewPart
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
@@ -98,6 +99,7 @@ class ViewFeed:
                 await self._look_at_map()
                 self._tell(_event("alive", None))
             await self._look_at_robot()
+            self._hear_person()
             n_looks = n_looks + 1 if self._pages else 0
             if self._pages:
                 await anyio.sleep(POSE_S)
@@ -105,6 +107,13 @@ class ViewFeed:
             with anyio.move_on_after(IDLE_S):
                 await self._has_page.wait()
             self._has_page = anyio.Event()
+
+    def _hear_person(self) -> None:
+        """Let an open page be somebody who is there for a drive of its own; for no other drive."""
+        drive = self.session.drives.under_way
+        if self._pages and drive is not None and drive.client == PERSON:
+            with self.session.client_is_heard():
+                pass
 
     def _first_events(self) -> list[bytes]:
         events = [_event("calls", [call.model_dump() for call in self.calls.calls])]
