@@ -1,6 +1,7 @@
 """The live page: what a browser is told, and what a person may do from it."""
 
 import io
+import json
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from PIL import Image
 from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from livepage import next_of, serve_live
-from mapspeak.errors import ConfigError, LinkError
+from mapspeak.errors import ConfigError, LinkError, MapError
 from mapspeak.robot import StampedPose
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.server.view.serving import serve_view
@@ -121,6 +122,39 @@ async def test_the_camera_is_shown_where_there_is_one(tmp_path: Path) -> None:
         assert (await live.http.get("/robots/robot/camera")).status_code == 404
 
 
+@pytest.mark.parametrize(
+    "error", [MapError("There is no frame.", hint="Look at TF."), RuntimeError("a bug of ours")]
+)
+async def test_an_error_while_a_page_is_told_of_the_robot_does_not_end_its_server(
+    tmp_path: Path, error: Exception
+) -> None:
+    class Odd(FakeRobot):
+        n_looks = 0
+
+        async def fetch_pose(self) -> StampedPose:
+            self.n_looks += 1
+            if 1 < self.n_looks < 4:
+                raise error
+            return await super().fetch_pose()
+
+    async with serve_live(tmp_path, robot := Odd(two_rooms())) as live, live.hear() as events:
+        while robot.n_looks < 4:
+            await next_of(events, "alive")
+        assert (await live.command("stop")).status_code == 200
+
+
+async def test_calls_with_long_arguments_and_answers_are_kept_within_bounds(
+    tmp_path: Path,
+) -> None:
+    async with serve_live(tmp_path) as live:
+        for _ in range(30):
+            long = {"name": "x", "description": "y" * 100_000, "geometric_features": ["z"] * 9000}
+            await live.client.call_tool("write_semantic_data", long)
+        calls = await live.wait_for("calls")
+    assert [call["number"] for call in calls][-1] == 30
+    assert len(json.dumps(calls)) <= 250_000
+
+
 # --- what a person may do --------------------------------------------------------------------
 
 
@@ -131,6 +165,38 @@ async def test_a_stop_needs_no_key(tmp_path: Path) -> None:
     assert said.status_code == 200
     assert live.robot.n_stops == 1
     assert live.session.drives.under_way is None
+
+
+async def test_a_stop_that_does_not_reach_the_robot_is_told_as_such(tmp_path: Path) -> None:
+    class Deaf(FakeRobot):
+        async def stop(self) -> None:
+            raise LinkError("The robot does not answer.", hint="Look at its network.")
+
+    async with serve_live(tmp_path, Deaf(two_rooms())) as live:
+        for command in ("stop", "hold"):
+            said = await live.command(command)
+            assert said.status_code == 409
+            assert "NOT STOPPED" in said.text
+
+
+async def test_a_hold_that_cannot_be_written_stops_the_robot_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "control").write_text("a file where a folder should be")
+    async with serve_live(tmp_path) as live:
+        said = await live.command("hold")
+    assert said.status_code == 409
+    assert "told to stop. It is NOT HELD" in said.text
+    assert live.robot.n_stops == 1
+
+
+async def test_the_log_says_who_stopped_held_and_released(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.unlock()
+        for command in ("stop", "hold", "release"):
+            await live.command(command)
+    noted = [(line.event, line.client) for line in audit_of(tmp_path)]
+    person = "a person at the live page"
+    assert noted.count(("stop", person)) >= 2
+    assert noted[-1] == ("release", person)
 
 
 async def test_a_hold_needs_no_key_and_a_release_does(tmp_path: Path) -> None:
@@ -208,6 +274,9 @@ async def test_a_waiting_command_is_shown_and_approved_once(tmp_path: Path) -> N
         await live.unlock()
         assert "Approved: drive to" in (await live.command("approve", id=wish)).text
         assert (await live.command("approve", id=wish)).status_code == 409
+        (word,) = [line for line in audit_of(tmp_path) if line.event == "approval"]
+        assert word.client == "a person at the live page"
+        assert word.said.startswith(f"approved {wish}: drive to")
         driven = await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert not driven.is_error
     assert len(live.robot.goals) == 1

@@ -66,7 +66,7 @@ class AuditLine:
         robot: Which one it is about, where a server has several.
         wall_time: ISO 8601, by the operator's clock.
         robot_s: Robot time.
-        event: "decision", "result", "leg", "ended", "stop" or "memory".
+        event: "decision", "result", "leg", "ended", "stop", "release", "approval" or "memory".
         client: Who wanted it.
         tool: By which tool.
         kind: Of command; empty for what is none.

@@ -282,7 +282,7 @@ class Guard:
         self._note("leg", permit, robot_s=robot_s, said=said)
 
     def note_event(self, event: str, said: str, *, robot_s: float) -> None:
-        """Note what is no command: a stop, a hold. It never fails: stopping goes first."""
+        """Note what is no command: a stop, a release. It never fails: stopping goes first."""
         try:
             self.audit.write(
                 event,

@@ -10,6 +10,7 @@ from mapspeak.driving.routes.planning import RouteStop, StopState
 from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate
 from mapspeak.driving.search.evidence import Earlier
 from mapspeak.driving.search.progress import BudgetKind, SearchProgress, SearchState
+from mapspeak.errors import LinkError
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.server.text.maps import say_merits, say_refusal
@@ -82,6 +83,14 @@ CHECK = {
         "where it is, and that the goal lies on the map."
     ),
 }
+
+
+def not_stopped(error: LinkError) -> LinkError:
+    """Return the error of a stop that did not reach the robot, as a person must read it."""
+    return LinkError(
+        f"NOT STOPPED: {error.message}",
+        hint=f"The robot may still move: press its own stop button. {error.hint}",
+    )
 
 
 def say_cause(cause: Cause | None) -> str:

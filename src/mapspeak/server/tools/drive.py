@@ -17,7 +17,7 @@ from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.robot import DriveAnswer
 from mapspeak.server.text.descriptions import describe_view
-from mapspeak.server.text.drives import say_cause
+from mapspeak.server.text.drives import not_stopped, say_cause
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.asking import (
@@ -154,10 +154,7 @@ class DriveTools:
         try:
             await self._session.drives.stop()
         except LinkError as error:
-            raise LinkError(
-                f"NOT STOPPED: {error.message}",
-                hint=f"The robot may still move: press its own stop button. {error.hint}",
-            ) from error
+            raise not_stopped(error) from error
         told = "" if ended is None else f" {ended.goal_id} was ended."
         return f"The robot was told to stop, and to give up every goal, whoever sent it.{told}"
 

@@ -2,6 +2,7 @@
 
 import base64
 import itertools
+import json
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -15,6 +16,9 @@ from mapspeak.server.view.document import ViewPart
 MOST_CALLS = 100
 MOST_CHARACTERS = 20_000
 """Of one text; the rest is told to be cut."""
+MOST_OF_ARGUMENT = 2_000
+MOST_KEPT = 200_000
+"""Characters of all calls together: a page is told all of them whenever it comes back."""
 
 
 class CallView(ViewPart):
@@ -45,6 +49,7 @@ class CallFeed:
         self._log = log
         self._numbers = itertools.count(1)
         self._calls: dict[int, CallView] = {}
+        self._n_characters: dict[int, int] = {}
         self._pictures: dict[int, deque[ImageContent]] = {}
         self.tell: Callable[[CallView], None] = lambda _: None
 
@@ -64,7 +69,8 @@ class CallFeed:
     def noting(self, tool: str, arguments: dict[str, Any]) -> Iterator[CallNote]:
         """Note a call, when it begins and when it has come to its end."""
         number = next(self._numbers)
-        begun = CallView(number=number, tool=tool, arguments=arguments, is_over=False)
+        shown = {_cut(name, MOST_OF_ARGUMENT): _shorten(value) for name, value in arguments.items()}
+        begun = CallView(number=number, tool=tool, arguments=shown, is_over=False)
         self._keep(begun)
         own = nullcontext(CallNote(error="It came to no answer."))
         with self._log.noting(tool, arguments) if self._log else own as note:
@@ -92,14 +98,22 @@ class CallFeed:
 
     def _keep(self, call: CallView) -> None:
         self._calls[call.number] = call
-        while len(self._calls) > MOST_CALLS:
+        self._n_characters[call.number] = len(call.model_dump_json())
+        while len(self._calls) > MOST_CALLS or (
+            len(self._calls) > 1 and sum(self._n_characters.values()) > MOST_KEPT
+        ):
             oldest = next(iter(self._calls))
-            del self._calls[oldest]
+            del self._calls[oldest], self._n_characters[oldest]
             self._pictures.pop(oldest, None)
         self.tell(call)
 
 
-def _cut(text: str) -> str:
-    if len(text) <= MOST_CHARACTERS:
+def _cut(text: str, most: int = MOST_CHARACTERS) -> str:
+    if len(text) <= most:
         return text
-    return f"{text[:MOST_CHARACTERS]}\n... {len(text) - MOST_CHARACTERS} characters more"
+    return f"{text[:most]}\n... {len(text) - most} characters more"
+
+
+def _shorten(value: object) -> object:
+    text = json.dumps(value, default=str)
+    return value if len(text) <= MOST_OF_ARGUMENT else _cut(text, MOST_OF_ARGUMENT)

@@ -4,15 +4,17 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import ConfigError, GoalError, LinkError
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place, Spot, say_spot
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.safety import Caller, Guard, calling
+from mapspeak.server.text.drives import not_stopped
 from mapspeak.session import Session
 
 PERSON = "a person at the live page"
+CALLER = Caller(client=PERSON, tool="live page")
 Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
@@ -41,27 +43,44 @@ class PersonCommands:
 
     async def stop(self) -> str:
         """Stop the robot at once and end every drive."""
-        await self._session.drives.stop()
+        with calling(CALLER):
+            try:
+                await self._session.drives.stop()
+            except LinkError as error:
+                raise not_stopped(error) from error
         return "The robot was told to stop."
 
     async def hold(self) -> str:
         """Stop the robot, and let nobody drive it until it is released."""
         guard = self._require_guard()
-        guard.hold.put(f"by {PERSON}", at=guard.wall_clock())
-        await self._session.drives.stop()
+        try:
+            guard.hold.put(f"by {PERSON}", at=guard.wall_clock())
+        except ConfigError as error:
+            stopped = await self.stop()
+            raise ConfigError(
+                f"{stopped} It is NOT HELD: {error.message}", hint=error.hint
+            ) from error
+        await self.stop()
         return "The robot was told to stop, and is held."
 
     async def release(self) -> str:
         """Let a held robot drive again."""
-        return "Released." if self._require_guard().hold.lift() else "Nothing was held."
+        was_held = self._require_guard().hold.lift()
+        if was_held:
+            self._note("release", "released")
+        return "Released." if was_held else "Nothing was held."
 
     async def approve(self, wish: Wish) -> str:
         """Agree to a command that waits, once."""
-        return f"Approved: {self._require_guard().approvals.room.approve(wish.id)}."
+        what = self._require_guard().approvals.room.approve(wish.id)
+        self._note("approval", f"approved {wish.id}: {what}")
+        return f"Approved: {what}."
 
     async def refuse(self, wish: Wish) -> str:
         """Take a command that waits off the list."""
-        return f"Refused: {self._require_guard().approvals.room.refuse(wish.id)}."
+        what = self._require_guard().approvals.room.refuse(wish.id)
+        self._note("approval", f"refused {wish.id}: {what}")
+        return f"Refused: {what}."
 
     async def check(self, target: MapTarget) -> str:
         """Say whether the robot can drive to a point."""
@@ -75,13 +94,16 @@ class PersonCommands:
     async def drive(self, target: MapTarget) -> str:
         """Send the robot to a point."""
         session = self._session
-        person = Caller(client=PERSON, tool="live page")
-        with calling(person), session.client_is_heard(), session.drives.preparing() as ticket:
+        with calling(CALLER), session.client_is_heard(), session.drives.preparing() as ticket:
             goal = await session.find_goal(place=None, x=target.x, y=target.y, yaw_deg=None)
             drive = await session.drives.start(
                 goal.pose, place=goal.title, ticket=ticket, client=PERSON
             )
         return f"{drive.goal_id} to {drive.place} has begun."
+
+    def _note(self, event: str, said: str) -> None:
+        with calling(CALLER):
+            self._require_guard().note_event(event, said, robot_s=self._session.robot.now_s)
 
     def _require_guard(self) -> Guard:
         guard = self._session.guard

@@ -1,6 +1,7 @@
 """What pages are told as it happens: one watch of a robot, however many look."""
 
 import json
+import logging
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from functools import partial
@@ -9,7 +10,7 @@ from typing import Any
 import anyio
 from anyio.streams.memory import MemoryObjectReceiveStream, MemoryObjectSendStream
 
-from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.wording import say_pose_doubt
@@ -28,6 +29,8 @@ MOST_UNREAD = 200
 """A page that reads no more than that is let go; it comes back when it can."""
 TRAIL_M = 0.25
 MOST_TRAIL = 4000
+
+logger = logging.getLogger(__name__)
 
 
 class DriveView(ViewPart):
@@ -74,6 +77,7 @@ class ViewFeed:
         self._path: tuple[str, list[tuple[float, float]]] = ("", [])
         self._trail: list[tuple[float, float]] = []
         self._robot: RobotView | None = None
+        self._has_failed = False
         calls.tell = self._tell_call
 
     @asynccontextmanager
@@ -95,10 +99,7 @@ class ViewFeed:
         """Look at the robot and tell the pages, until cancelled; without pages keep the trail."""
         n_looks = 0
         while True:
-            if self._pages and n_looks % MAP_EVERY == 0:
-                await self._look_at_map()
-                self._tell(_event("alive", None))
-            await self._look_at_robot()
+            await self._look(with_map=bool(self._pages) and n_looks % MAP_EVERY == 0)
             self._hear_person()
             n_looks = n_looks + 1 if self._pages else 0
             if self._pages:
@@ -107,6 +108,17 @@ class ViewFeed:
             with anyio.move_on_after(IDLE_S):
                 await self._has_page.wait()
             self._has_page = anyio.Event()
+
+    async def _look(self, *, with_map: bool) -> None:
+        try:
+            if with_map:
+                self._tell(_event("alive", None))
+                await self._look_at_map()
+            await self._look_at_robot()
+        except Exception:  # an error of ours in a page must not end the server of a robot
+            if not self._has_failed:
+                logger.exception("The live page is not told all that happens.")
+            self._has_failed = True
 
     def _hear_person(self) -> None:
         """Let an open page be somebody who is there for a drive of its own; for no other drive."""
@@ -157,7 +169,7 @@ class ViewFeed:
         pose, age_s, doubt, fault = None, 0.0, "", ""
         try:
             stamped = await robot.fetch_pose()
-        except LinkError as error:
+        except MapspeakError as error:
             fault = str(error)
         else:
             pose, age_s = PoseView.of(stamped.pose), round(robot.now_s - stamped.stamp_s, 1)

@@ -6,6 +6,8 @@ const COLOURS = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#cc79a7
 const CONE_M = 3;
 const CONE_DEG = 35;
 const NAMES_FROM_PX_PER_M = 12;
+const TRAIL_M = 0.25;
+const MOST_TRAIL = 4000;
 
 /** Return an element with text in it, which is never read as HTML. @param {string} text */
 function plain(text) {
@@ -37,6 +39,8 @@ export class LiveMap {
     const { robot: _, ...chosen } = this.layers;
     L.control.layers(null, chosen).addTo(this.map);
     this.isPlaced = false;
+    /** @type {number[][]} */
+    this.track = [];
     this.trail = L.polyline([], { color: "#888", weight: 2 }).addTo(this.layers.trail);
     this.path = L.polyline([], { color: "#0072b2", weight: 3, dashArray: "6 6" }).addTo(this.layers.path);
     this.cone = L.polygon([], { color: "#d55e00", weight: 1, fillOpacity: 0.12 }).addTo(this.layers.robot);
@@ -153,7 +157,16 @@ export class LiveMap {
 
   /** @param {number[][]} trail */
   showTrail(trail) {
-    this.trail.setLatLngs(trail.map((at) => this.place(at)));
+    this.track = trail.map((at) => this.place(at));
+    this.trail.setLatLngs(this.track);
+  }
+
+  /** Lengthen the trail as the server does, for a page that is left open. @param {number[]} at */
+  follow(at) {
+    const last = this.track.at(-1);
+    if (last && Math.abs(at[0] - last[0]) + Math.abs(at[1] - last[1]) < TRAIL_M) return;
+    this.track = [...this.track, at].slice(-MOST_TRAIL);
+    this.trail.setLatLngs(this.track);
   }
 
   /** @param {any} robot */
@@ -170,7 +183,7 @@ export class LiveMap {
       return this.place([pose.x + CONE_M * Math.cos(turn), pose.y + CONE_M * Math.sin(turn)]);
     });
     this.cone.setLatLngs([at, ...rim]);
-    this.trail.addLatLng(at);
+    this.follow(at);
   }
 
   /** Ask what a person wants at a place. @param {{lat: number, lng: number}} latlng */
