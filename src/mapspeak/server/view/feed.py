@@ -16,7 +16,8 @@ from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.wording import say_pose_doubt
 from mapspeak.server.view.calls import CallFeed, CallView
 from mapspeak.server.view.commands import PERSON
-from mapspeak.server.view.document import GridView, Overlay, PoseView, ViewPart
+from mapspeak.server.view.document import GridView, PoseView, ViewPart
+from mapspeak.server.view.overlay import Overlay
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
