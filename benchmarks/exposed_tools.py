@@ -37,7 +37,7 @@ from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, op
 from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
-from mapspeak.skills import (
+from mapspeak.skill import (
     JsonValue,
     OnProgress,
     SkillEffect,

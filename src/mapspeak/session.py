@@ -34,6 +34,7 @@ from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
 from mapspeak.ros.port import RosConnection, started_over
 from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
+from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
@@ -67,6 +68,7 @@ class Session:
         keeper: Which frame of the memory the robot's map is in.
         recollector: Keeps what was made of the memory.
         world: The map as it was looked at last; None before.
+        skilled: The robot where it has skills of its own; each is run through the guard alone.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Session:
         lease_s: float,
         guard: Guard | None = None,
         ros: RosConnection | None = None,
+        skilled: SkilledRobot | None = None,
         find_model: Callable[[], Embedder | None] = find_model,
     ) -> None:
         self.guard = guard
@@ -101,13 +104,12 @@ class Session:
                     by_hand=self._guarded.by_hand,
                     planner=self._guarded.planner,
                 )
-        self.ros = ros
+        self.ros, self.skilled = ros, skilled
         self.robot: Robot = self._guarded or robot
         name_robot, lock = lambda: robot.description.name, threading.RLock()
         self.memory = FramedMemory(memory, name_robot=name_robot, lock=lock)
         self.keeper = self.memory.keeper
-        self.pictures = PictureBook()
-        folder = memory_folder(memory.path)
+        self.pictures, folder = PictureBook(), memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
         wall_clock = None if guard is None else guard.wall_clock
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)

@@ -24,7 +24,7 @@ def test_the_documented_values_are_the_defaults_but_for_the_areas(tmp_path: Path
 
 def test_every_key_is_documented() -> None:
     text = examples()[0]
-    same_as_publish = {"call", "act", "set_parameter"}
+    same_as_publish = {"call", "act", "set_parameter", "skill"}
     assert [key for key in _PolicyFile.model_fields if f"{key}:" not in text] == sorted(
         same_as_publish, key=list(_PolicyFile.model_fields).index
     )

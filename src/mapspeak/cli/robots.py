@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from mapspeak.ros.discovery.overrides import RobotOverrides
     from mapspeak.ros.port import RosConnection
     from mapspeak.ros.robot import RosRobot
+    from mapspeak.skill import SkilledRobot
 
     OpenLink = Callable[[], AbstractAsyncContextManager[RosRobot]]
 
@@ -176,11 +177,13 @@ class ServedRobot:
         robot: The robot.
         ros: The connection of one that speaks ROS.
         map_name: Which map or building it drives in; empty where nobody says.
+        skilled: The robot where it has skills of its own.
     """
 
     robot: "Robot"
     ros: "RosConnection | None"
     map_name: str
+    skilled: "SkilledRobot | None" = None
 
 
 @asynccontextmanager

@@ -105,4 +105,11 @@ async def open_session(
         folder = scratch / name if served.ros is None else data_folder()
         file = keep_usual_memory(folder, served.map_name, choice.shown, address=choice.robot)
     memory = open_store(file, map_id=served.map_name or None)
-    return Session(served.robot, memory, lease_s=lease_s, guard=guard, ros=served.ros)
+    return Session(
+        served.robot,
+        memory,
+        lease_s=lease_s,
+        guard=guard,
+        ros=served.ros,
+        skilled=served.skilled,
+    )

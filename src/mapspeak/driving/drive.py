@@ -98,6 +98,11 @@ class DriveBook:
         return bool(self._open()) or self._owed.goal_id is not None or self._n_preparing > 0
 
     @property
+    def n_stops(self) -> int:
+        """How often a stop was asked for here."""
+        return self._n_stops
+
+    @property
     def driven_m(self) -> float:
         """How far the robot has come on its drives, by its own poses."""
         return self._monitor.driven_m

@@ -1,7 +1,7 @@
 """Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
 
 from mapspeak.hold import Hold
-from mapspeak.safety.approvals import Approvals, Errand, WaitingRoom, on_errand
+from mapspeak.safety.approvals import Approvals, Errand, WaitingRoom, covered_by, on_errand
 from mapspeak.safety.audit import (
     NOBODY,
     AuditLine,
@@ -18,6 +18,7 @@ from mapspeak.safety.commands import (
     CommandKind,
     DriveCommand,
     Publish,
+    RunSkill,
     SetParameter,
     say_command,
 )
@@ -75,6 +76,7 @@ __all__ = [
     "Policy",
     "Publish",
     "Refused",
+    "RunSkill",
     "SetParameter",
     "Situation",
     "Speeds",
@@ -82,6 +84,7 @@ __all__ = [
     "WaitingRoom",
     "WhenBusy",
     "calling",
+    "covered_by",
     "current_caller",
     "decide",
     "load_policy",

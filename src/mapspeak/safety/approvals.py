@@ -21,17 +21,20 @@ class Errand:
         what: In words, as in "may the robot explore".
         n_drives: At most so many.
         duration_s: Within so much robot time from the first one on.
+        n_commands: At most so many commands that are no drives; each is for itself where it is 0.
     """
 
     what: str
     n_drives: int
     duration_s: float
+    n_commands: int = 0
 
     @property
     def said(self) -> str:
         """The errand with its bounds, in words."""
         drives = "one drive" if self.n_drives == 1 else f"up to {self.n_drives} drives"
-        return f"{self.what}, {drives} within {self.duration_s:g} s"
+        commands = f" and {self.n_commands} other commands" if self.n_commands else ""
+        return f"{self.what}, {drives}{commands} within {self.duration_s:g} s"
 
 
 # State of a task, not of the module: what the present call is for.
@@ -53,6 +56,25 @@ def on_errand(errand: Errand) -> Generator[None]:
         _ERRAND.reset(token)
 
 
+# Likewise: the person's word for the skill that gives commands now.
+_WORD: ContextVar[str] = ContextVar("word", default="")
+
+
+def current_word() -> str:
+    """Return the id of the word that covers what is commanded now; empty where none does."""
+    return _WORD.get()
+
+
+@contextmanager
+def covered_by(word: str) -> Generator[None]:
+    """Let a word that allowed a skill cover the commands that it gives in the `with` block."""
+    token = _WORD.set(word)
+    try:
+        yield
+    finally:
+        _WORD.reset(token)
+
+
 @dataclass(slots=True)
 class _Approved:
     """An errand that a person has agreed to, as far as it is used up."""
@@ -60,6 +82,7 @@ class _Approved:
     wish_id: str
     begun_s: float
     n_left: int
+    n_commands_left: int
 
 
 class Errands:
@@ -70,18 +93,24 @@ class Errands:
 
     def begin(self, errand: Errand, *, client: str, wish_id: str, robot_s: float) -> None:
         """Note that a person has agreed; the first drive is yet to be taken."""
-        self._approved[client, errand] = _Approved(wish_id, robot_s, errand.n_drives)
+        self._approved[client, errand] = _Approved(
+            wish_id, robot_s, errand.n_drives, errand.n_commands
+        )
 
-    def take_drive(self, errand: Errand, *, client: str, robot_s: float) -> str | None:
-        """Use up one drive and return the id of the word that covers it; None where none does."""
+    def take_part(
+        self, errand: Errand, *, client: str, robot_s: float, is_drive: bool
+    ) -> str | None:
+        """Use up one command and return the id of the word that covers it; None where none does."""
         approved = self._approved.get((client, errand))
         if approved is None:
             return None
         is_in_time = 0 <= robot_s - approved.begun_s < errand.duration_s
-        if not is_in_time or approved.n_left < 1:
+        n_left = approved.n_left if is_drive else approved.n_commands_left
+        if not is_in_time or n_left < 1:
             del self._approved[client, errand]
             return None
-        approved.n_left -= 1
+        approved.n_left -= is_drive
+        approved.n_commands_left -= not is_drive
         return approved.wish_id
 
     def end_all(self) -> None:

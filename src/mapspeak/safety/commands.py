@@ -25,6 +25,7 @@ class CommandKind(StrEnum):
     CALL = "call"
     ACT = "act"
     SET_PARAMETER = "set_parameter"
+    SKILL = "skill"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +113,23 @@ class SetParameter:
         return f"{self.node}:{self.name}" if self.node else self.name
 
 
-Command = DriveCommand | Publish | Call | Act | SetParameter
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSkill:
+    """Runs a skill of the robot, or a mission.
+
+    Attributes:
+        skill: Its name.
+        arguments: What it is given.
+        needs_word: A person has to agree, whatever the policy says.
+    """
+
+    skill: str
+    arguments: Message
+    needs_word: bool = False
+    kind = CommandKind.SKILL
+
+
+Command = DriveCommand | Publish | Call | Act | SetParameter | RunSkill
 
 
 def say_command(command: Command) -> str:
@@ -127,10 +144,14 @@ def say_command(command: Command) -> str:
         case Act():
             kind = _in_brackets(command.true_type or command.type)
             return f"send a goal to {command.action}{kind}"
-        case SetParameter(value=None):
-            return f"delete {command.full_name}"
+        case RunSkill(skill=skill, arguments=arguments):
+            given = ", ".join(f"{name}={value!r}" for name, value in arguments.items())
+            return f"run the skill {skill}{_in_brackets(given[:MOST_SHOWN])}"
         case SetParameter():
-            return f"set {command.full_name} to {str(command.value)[:MOST_SHOWN]!r}"
+            value = f" to {str(command.value)[:MOST_SHOWN]!r}"
+            is_deleted = command.value is None
+            verb = "delete" if is_deleted else "set"
+            return f"{verb} {command.full_name}{'' if is_deleted else value}"
 
 
 def read_action_goal(command: Publish) -> Act | None:

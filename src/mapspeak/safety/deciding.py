@@ -17,6 +17,7 @@ from mapspeak.safety.commands import (
     Command,
     DriveCommand,
     Publish,
+    RunSkill,
     SetParameter,
     say_command,
 )
@@ -71,7 +72,7 @@ class Situation:
     Attributes:
         held_by: Why the robot is held; None where it is not.
         n_in_last_minute: Commands of this kind that were allowed in the last minute.
-        is_approved: A person has agreed to this command.
+        is_approved: A person has agreed to this command, or to the skill that gives it.
         objection: What is against a velocity or the goal of an action by where it leads.
     """
 
@@ -91,7 +92,7 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
     """Decide on a command."""
     refusals = (
         _against_everything(policy, situation),
-        _against_name(command, policy),
+        _against_name(command, policy, is_approved=situation.is_approved),
         judge_check(command.check, policy) if isinstance(command, DriveCommand) else None,
         _against_speed(command, policy),
         situation.objection,
@@ -100,7 +101,8 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
     refused = next((each for each in refusals if each is not None), None)
     if refused is not None:
         return refused
-    if command.kind in policy.approval.kinds and not situation.is_approved:
+    needs_word = isinstance(command, RunSkill) and command.needs_word
+    if (needs_word or command.kind in policy.approval.kinds) and not situation.is_approved:
         return NeedsApproval(question=f"May the robot {say_command(command)}?")
     return Allowed()
 
@@ -126,13 +128,13 @@ def is_name_denied(command: Command, policy: Policy) -> bool:
     return _against_name(command, policy) is not None
 
 
-def _against_name(command: Command, policy: Policy) -> Refused | None:
+def _against_name(command: Command, policy: Policy, *, is_approved: bool = False) -> Refused | None:
     patterns = policy.patterns.get(command.kind)
     if isinstance(command, DriveCommand) or patterns is None:
         return None
     name = _name_of(command)
     denial = patterns.find_denial(name, _types_of(command))
-    if denial is None:
+    if denial is None or (is_approved and denial.key == "usual_denials"):
         return None
     key, said = f"{command.kind}.{denial.key}", ", ".join(denial.patterns) or "nothing"
     how = f"change {key}"
@@ -147,15 +149,15 @@ def _against_name(command: Command, policy: Policy) -> Refused | None:
     )
 
 
-def _name_of(command: Publish | Call | Act | SetParameter) -> str:
+def _name_of(command: Publish | Call | Act | SetParameter | RunSkill) -> str:
     match command:
-        case Publish(topic=name) | Call(service=name) | Act(action=name):
+        case Publish(topic=name) | Call(service=name) | Act(action=name) | RunSkill(skill=name):
             return name
         case SetParameter():
             return command.full_name
 
 
-def _types_of(command: Publish | Call | Act | SetParameter) -> tuple[str, ...]:
+def _types_of(command: Publish | Call | Act | SetParameter | RunSkill) -> tuple[str, ...]:
     """Return the types that a command is known by, as they were written and as "package/Type"."""
     types: tuple[str, ...] = ()
     match command:
@@ -163,7 +165,7 @@ def _types_of(command: Publish | Call | Act | SetParameter) -> tuple[str, ...]:
             types = (command.type, command.true_type)
         case Publish() | Call():
             types = (command.type,)
-        case SetParameter():
+        case SetParameter() | RunSkill():
             pass
     return tuple({form for each in types if each for form in (each, bare_type(each))})
 

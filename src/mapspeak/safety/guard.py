@@ -5,6 +5,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import partial
 
 import anyio
 import anyio.to_thread
@@ -19,7 +20,7 @@ from mapspeak.places.recall.notices import (
     say_events,
     say_unplaced,
 )
-from mapspeak.safety.approvals import Approvals, Errand, Errands, current_errand
+from mapspeak.safety.approvals import Approvals, Errand, Errands, current_errand, current_word
 from mapspeak.safety.audit import AuditLog, Caller, current_caller
 from mapspeak.safety.commands import Command, CommandKind, DriveCommand
 from mapspeak.safety.deciding import Allowed, Decision, NeedsApproval, Refused, Situation, decide
@@ -197,11 +198,13 @@ class Permit:
         number: Of the command in the audit log.
         command: The command.
         caller: Who gave it.
+        by: The person's word for it; empty where none was needed.
     """
 
     number: int
     command: Command
     caller: Caller
+    by: str = ""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -216,6 +219,7 @@ class Guard:
         wall_clock: The operator's.
         robot: What the operator calls it; empty leaves that to the robot.
         address: Where the robot is; empty for one that nobody else can reach.
+        n_stops: How often the robot was stopped, for whatever reason.
     """
 
     policy: Policy
@@ -225,6 +229,7 @@ class Guard:
     wall_clock: Callable[[], datetime]
     robot: str = ""
     address: str = ""
+    n_stops: int = 0
     _rates: RateLog = field(default_factory=RateLog)
     _errands: Errands = field(default_factory=Errands)
 
@@ -261,8 +266,9 @@ class Guard:
                 raise error
             case NeedsApproval(question=question):
                 raise self._ask(command, question, caller)
-            case Allowed():
+            case Allowed(by=by):
                 self._rates.note(command.kind, robot_s)
+                permit = replace(permit, by=by)
         return permit
 
     def note_result(self, permit: Permit, said: str, *, robot_s: float) -> None:
@@ -298,32 +304,42 @@ class Guard:
         self, command: Command, caller: Caller, robot_s: float, objection: Refused | None
     ) -> Decision:
         situation = replace(self._situation(command, robot_s), objection=objection)
+        word = current_word()
+        if word:
+            situation = replace(situation, is_approved=True)
         decision = decide(command, policy=self.policy, situation=situation)
         if not isinstance(decision, NeedsApproval):
-            return decision
+            return Allowed(by=word) if word and isinstance(decision, Allowed) else decision
         errand = _errand_of(command)
         if errand is None:
             wish_id = self.approvals.take_word(command, client=caller.client)
         else:
-            wish_id = self._take_part(errand, caller.client, robot_s)
+            is_drive = isinstance(command, DriveCommand)
+            wish_id = self._take_part(errand, caller.client, robot_s, is_drive=is_drive)
             decision = NeedsApproval(question=_ask_for(errand))
         if wish_id is None:
             return decision
         return Allowed(by=wish_id if errand is None else f"{wish_id}: {errand.said}")
 
-    def _take_part(self, errand: Errand, client: str, robot_s: float) -> str | None:
-        """Return the word that covers another drive of an errand; None where none does any more."""
-        wish_id = self._errands.take_drive(errand, client=client, robot_s=robot_s)
+    def _take_part(
+        self, errand: Errand, client: str, robot_s: float, *, is_drive: bool
+    ) -> str | None:
+        """Return the word that covers one more command of an errand; None where none does."""
+        take = partial(
+            self._errands.take_part, errand, client=client, robot_s=robot_s, is_drive=is_drive
+        )
+        wish_id = take()
         if wish_id is not None:
             return wish_id
         wish_id = self.approvals.take_word(errand, client=client)
         if wish_id is None:
             return None
         self._errands.begin(errand, client=client, wish_id=wish_id, robot_s=robot_s)
-        return self._errands.take_drive(errand, client=client, robot_s=robot_s)
+        return take()
 
     def end_errands(self) -> None:
         """Let a person be asked again for what is left of errands: the robot was stopped."""
+        self.n_stops += 1
         self._errands.end_all()
 
     def _situation(self, command: Command, robot_s: float) -> Situation:
@@ -370,8 +386,10 @@ def _say_decision(decision: Decision) -> tuple[str, str]:
 
 
 def _errand_of(command: Command) -> Errand | None:
-    """Return what a drive is a part of; None for one that is for itself, and for other commands."""
-    return current_errand() if isinstance(command, DriveCommand) else None
+    """Return what a command is a part of; None for one that is for itself."""
+    errand = current_errand()
+    is_part = errand is not None and (isinstance(command, DriveCommand) or errand.n_commands > 0)
+    return errand if is_part else None
 
 
 def _ask_for(errand: Errand) -> str:

@@ -47,6 +47,7 @@ USUAL_DENIALS = {
         *("*frame*", "*use_sim_time", "*topic*", "*initial_pose*", "*map_server*"),
         *("*publish_tf*", "*tf_broadcast*", "*tf_prefix*"),
     ),
+    CommandKind.SKILL: (),
 }
 """By what things are called."""
 
@@ -71,6 +72,7 @@ USUAL_TYPES = {
         *("*/DriveArc", "*/DriveDistance", "*/RotateAngle", "*/WallFollow"),
     ),
     CommandKind.SET_PARAMETER: (),
+    CommandKind.SKILL: (),
 }
 """By what the robot says they are, whatever they are called."""
 
@@ -223,6 +225,7 @@ USUAL_RATES = {
     CommandKind.CALL: 120,
     CommandKind.ACT: 60,
     CommandKind.SET_PARAMETER: 30,
+    CommandKind.SKILL: 120,
 }
 RATE_KEYS = {
     CommandKind.DRIVE: "drives_per_minute",
@@ -230,6 +233,7 @@ RATE_KEYS = {
     CommandKind.CALL: "calls_per_minute",
     CommandKind.ACT: "actions_per_minute",
     CommandKind.SET_PARAMETER: "parameters_per_minute",
+    CommandKind.SKILL: "skills_per_minute",
 }
 """What policy.yaml calls them."""
 

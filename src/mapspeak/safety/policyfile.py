@@ -207,6 +207,7 @@ class _WrittenApproval(_Written):
     calls: bool = False
     actions: bool = False
     parameters: bool = False
+    skills: bool = False
     otherwise: Literal["refuse", "queue"] = "refuse"
 
     def approval(self) -> Approval:
@@ -216,6 +217,7 @@ class _WrittenApproval(_Written):
             CommandKind.CALL: self.calls,
             CommandKind.ACT: self.actions,
             CommandKind.SET_PARAMETER: self.parameters,
+            CommandKind.SKILL: self.skills,
         }
         kinds = frozenset(kind for kind, is_asked in asked.items() if is_asked)
         return Approval(kinds=kinds, otherwise=Otherwise(self.otherwise))
@@ -227,6 +229,7 @@ class _WrittenRates(_Written):
     calls_per_minute: _PerMinute = USUAL_RATES[CommandKind.CALL]
     actions_per_minute: _PerMinute = USUAL_RATES[CommandKind.ACT]
     parameters_per_minute: _PerMinute = USUAL_RATES[CommandKind.SET_PARAMETER]
+    skills_per_minute: _PerMinute = USUAL_RATES[CommandKind.SKILL]
 
     def rates(self) -> dict[CommandKind, int]:
         return {kind: getattr(self, key) for kind, key in RATE_KEYS.items()}
@@ -244,6 +247,7 @@ class _PolicyFile(_Written):
     call: _WrittenPatterns = _WrittenPatterns()
     act: _WrittenPatterns = _WrittenPatterns()
     set_parameter: _WrittenPatterns = _WrittenPatterns()
+    skill: _WrittenPatterns = _WrittenPatterns()
     approval: _WrittenApproval = _WrittenApproval()
     rates: _WrittenRates = _WrittenRates()
 
@@ -265,6 +269,7 @@ class _PolicyFile(_Written):
                 CommandKind.CALL: self.call.patterns(CommandKind.CALL),
                 CommandKind.ACT: self.act.patterns(CommandKind.ACT),
                 CommandKind.SET_PARAMETER: self.set_parameter.patterns(CommandKind.SET_PARAMETER),
+                CommandKind.SKILL: self.skill.patterns(CommandKind.SKILL),
             },
             approval=self.approval.approval(),
             rates=self.rates.rates(),

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from mapspeak.errors import SkillError
-from mapspeak.skills.skill import JsonValue, ParameterKind, SkillParameter
+from mapspeak.skill import JsonValue, ParameterKind, SkillParameter
 
 MOST_SHOWN = 60
 WANTED = {

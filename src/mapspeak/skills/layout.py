@@ -23,7 +23,7 @@ from mapspeak.ros.definitions.types import (
     TypeBook,
 )
 from mapspeak.ros.messages.fields import Message, bare_type
-from mapspeak.skills.skill import JsonValue, ParameterKind, SkillParameter
+from mapspeak.skill import JsonValue, ParameterKind, SkillParameter
 
 MOST_FLAT = 40
 """A type with more plain fields keeps its messages as objects."""

@@ -9,7 +9,7 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError, SkillError
-from mapspeak.skills.skill import (
+from mapspeak.skill import (
     JsonValue,
     Skill,
     SkillCode,

@@ -16,7 +16,7 @@ from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.skills.reports import describe_skill, say_run
 from mapspeak.server.tools.skills.running import tell_news
 from mapspeak.server.tools.skills.schema import schema_of
-from mapspeak.skills import ParameterKind, Skill, SkillEffect, SkillParameter
+from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter
 from mapspeak.skills.arguments import check_value
 from mapspeak.skills.runs import SkillRuns
 

@@ -18,7 +18,7 @@ from mapspeak.server.tools.ros.inquiry import Described
 from mapspeak.server.tools.ros.measuring import check_frames
 from mapspeak.server.tools.ros.reading import hear
 from mapspeak.server.tools.ros.views import BULKY
-from mapspeak.skills import (
+from mapspeak.skill import (
     JsonValue,
     OnProgress,
     ParameterKind,

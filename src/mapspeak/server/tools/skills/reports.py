@@ -4,7 +4,7 @@ from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.ros.reports import cut, show_message
-from mapspeak.skills import (
+from mapspeak.skill import (
     Precondition,
     PreconditionKind,
     SkillCode,

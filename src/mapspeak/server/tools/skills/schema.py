@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mapspeak.memory.quoting import quote
-from mapspeak.skills import ParameterKind, SkillParameter
+from mapspeak.skill import ParameterKind, SkillParameter
 from mapspeak.skills.arguments import WANTED
 from mapspeak.skills.layout import MOST_TEXT
 

@@ -4,7 +4,7 @@ A skill is an exposed topic, service or action of the robot, an entry of skills.
 simulated robot, or a saved mission. Whoever runs one sees nothing else of it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Protocol
@@ -199,3 +199,14 @@ class Skill(Protocol):
             MapspeakError: It cannot be begun: wrong arguments, a denied or a missing interface, an
                 approval that is needed. Nothing was sent to the robot then.
         """
+
+
+class SkilledRobot(Protocol):
+    """A robot with skills of its own, which need no ROS; `mapspeak.skills` guards each of them."""
+
+    @property
+    def skills(self) -> Sequence[Skill]:
+        """What it can do besides driving, looking and stopping."""
+
+    async def fetch_battery(self) -> float | None:
+        """Return how full its battery is, from 0 to 1; None where it does not tell."""

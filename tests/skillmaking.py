@@ -1,0 +1,104 @@
+"""Skills and facts that a test has in its hands."""
+
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import anyio
+
+from guarding import MONDAY_NOON
+from mapspeak.skill import (
+    JsonValue,
+    OnProgress,
+    SkillEffect,
+    SkillOutcome,
+    SkillProgress,
+    SkillSpec,
+    SkillState,
+)
+
+Doing = Callable[[Mapping[str, JsonValue]], Awaitable[SkillOutcome]]
+
+
+def spec(name: str = "lift", **more: object) -> SkillSpec:
+    """Gives what is known of a skill, as far as a test says."""
+    known = {"description": "", "effect": SkillEffect.MOVES, "timeout_s": 10.0}
+    return SkillSpec(name=name, **(known | more))  # type: ignore[arg-type]
+
+
+@dataclass
+class FakeSkill:
+    """Keeps what it was given, and ends as a test says."""
+
+    spec: SkillSpec
+    do: Doing | None = None
+    outputs: Mapping[str, JsonValue] = field(default_factory=dict)
+    given: list[Mapping[str, JsonValue]] = field(default_factory=list)
+    n_ended: int = 0
+
+    async def run(
+        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
+    ) -> SkillOutcome:
+        self.given.append(arguments)
+        on_progress(SkillProgress())
+        try:
+            if self.do is not None:
+                return await self.do(arguments)
+        finally:
+            self.n_ended += 1
+        return SkillOutcome(state=SkillState.SUCCEEDED, outputs=self.outputs)
+
+
+async def never(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:
+    """Ends only when it is cancelled."""
+    await anyio.sleep_forever()
+    raise AssertionError
+
+
+@dataclass
+class FakeFacts:
+    """Facts as a test sets them; time passes with every look at the clock, and in every sleep."""
+
+    passes_s: float = 0.0
+    time_s: float = 100.0
+    battery: float | None = None
+    stands: bool = True
+    rooms: set[str] = field(default_factory=set)
+    near: set[str] = field(default_factory=set)
+    events: set[str] = field(default_factory=set)
+    seen: set[str] = field(default_factory=set)
+    calendar: datetime | None = MONDAY_NOON
+
+    @property
+    def now_s(self) -> float:
+        self.time_s += self.passes_s
+        return self.time_s
+
+    async def sleep(self, duration_s: float) -> None:
+        await anyio.lowlevel.checkpoint()
+        self.time_s += duration_s
+
+    def read_calendar(self) -> datetime | None:
+        return self.calendar
+
+    async def fetch_battery(self) -> float | None:
+        return self.battery
+
+    async def is_standing(self) -> bool:
+        return self.stands
+
+    async def is_in(self, room: str) -> bool:
+        return room in self.rooms
+
+    async def is_near(self, place: str, within_m: float) -> bool:
+        return within_m > 0 and place in self.near
+
+    async def has_event(self, words: str) -> bool:
+        return words in self.events
+
+    async def sees(self, label: str) -> bool:
+        return label in self.seen
+
+
+def tell_nobody(_progress: SkillProgress) -> None:
+    """Takes progress that a test does not look at."""
