@@ -25,7 +25,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from benchmarks.figure import Figure
-from benchmarks.mutations import Frame, as_png, mutate, pieces_of, seed_frames
+from benchmarks.mutations import Frame, mutate, pieces_of, seed_frames
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.ros.messages.grids import read_grid
 
@@ -206,10 +206,6 @@ def _map_as_cbor() -> list[Frame]:
     return [(False, cbor2.dumps(_publication(cbor2.CBORTag(72, _cells().tobytes()))))]
 
 
-def _map_as_png() -> list[Frame]:
-    return [(True, orjson.dumps({"op": "png", "data": as_png(_map_as_text())}))]
-
-
 def _map_in_fragments() -> list[Frame]:
     return [(True, piece) for piece in pieces_of(_map_as_text().decode(), PIECE_CHARACTERS)]
 
@@ -218,7 +214,6 @@ NOTHING, MUTATED = "nothing", "mutated"
 MAPS: dict[str, Callable[[], list[Frame]]] = {
     "JSON": lambda: [(True, _map_as_text())],
     "CBOR": _map_as_cbor,
-    "PNG": _map_as_png,
     "fragments": _map_in_fragments,
     "a bomb of empty lists": lambda: [(True, b'{"op": [' + b"[]," * 20_000_000 + b"[]]}")],
 }

@@ -1,16 +1,13 @@
 """Frames of a rosbridge as they should be, and ways to spoil them, by a seed."""
 
-import base64
-import io
 import math
 import random
 
 import cbor2
 import numpy as np
 import orjson
-from PIL import Image
 
-__all__ = ["Frame", "as_png", "mutate", "pieces_of", "seed_frames"]
+__all__ = ["Frame", "mutate", "pieces_of", "seed_frames"]
 
 Frame = tuple[bool, bytes]
 """Whether it is text, and its bytes."""
@@ -23,15 +20,6 @@ CBOR_TOKENS = (
 )  # fmt: skip
 TOKENS = JSON_TOKENS + CBOR_TOKENS
 MOST_REPEATED_BYTES = 3_000_000
-
-
-def as_png(text: bytes) -> str:
-    """Return a text as rosbridge hides it in a picture."""
-    side = math.ceil(math.sqrt(len(text) / 3))
-    encoded = io.BytesIO()
-    filled = text.ljust(side * side * 3, b"\n")
-    Image.frombytes("RGB", (side, side), filled).save(encoded, "PNG", compress_level=1)
-    return base64.b64encode(encoded.getvalue()).decode()
 
 
 def pieces_of(text: str, n_characters: int) -> list[bytes]:
@@ -67,7 +55,6 @@ def seed_frames(topic: str) -> list[Frame]:
         repr({"op": "publish", "topic": topic, "msg": scan}).replace("'", '"').encode(),
         orjson.dumps({"op": "service_response", "id": "1", "values": {"a": "é"}, "result": True}),
         orjson.dumps({"op": "action_result", "id": "1", "values": {}, "status": 4}),
-        orjson.dumps({"op": "png", "data": as_png(map_text)}),
         map_text,
         *pieces_of(map_text.decode(), 8_000),
     ]

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from benchmarks.figure import Figure
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
+from mapspeak.links.rosbridge import RosbridgeClient, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
 from mapspeak.links.rosbridge.protocol.conversation import Conversation, FrameRefused, Published
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid, write_grid
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 
@@ -43,7 +44,7 @@ SPLINTERS = (
     b"NaN", b"-Infinity", b"[[[[", b'"', b"\\u0000", b"1e999", b'{"op":',
     b"\xc2\x5b\xff", b"\xd8\x1c", b"\x9b" + b"\xff" * 8,
 )  # fmt: skip
-QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01)
+QUICK = Patience(first_pause_s=0.001, longest_pause_s=0.01)
 
 
 def measure() -> Iterator[Figure]:
@@ -138,7 +139,7 @@ async def _reconnect() -> dict[str, float]:
     scripted.latched["/map"] = scripted.map_message(grid)
     async with (
         running(scripted.server) as server,
-        open_rosbridge_robot(server.url, timing=QUICK) as robot,
+        open_rosbridge_robot(server.url, patience=QUICK) as robot,
     ):
         await robot.fetch_map()
         goal_id = await robot.send_goal(Pose(1.0, 1.0))

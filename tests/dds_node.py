@@ -34,6 +34,7 @@ from mapspeak.links.dds.participant import DdsNetwork, DdsParticipant
 from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
 from mapspeak.links.endpoints import Sample
 from mapspeak.ros.definitions.typestore import hash_type
+from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
 LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)
@@ -238,13 +239,18 @@ async def open_dds_node(
 
 @asynccontextmanager
 async def open_here(
-    network: DdsNetwork, *, framing: Framing = Framing.NUMBERED
+    network: DdsNetwork,
+    *,
+    framing: Framing = Framing.NUMBERED,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[DdsConnection]:
     """Connects to nodes in this process, which find each other at once.
 
     All of DDS here is Cyclone's: that a node is on Fast DDS can only be claimed.
     """
-    async with open_dds_connection(network, framing_of=lambda _key: framing) as connection:
+    async with open_dds_connection(
+        network, framing_of=lambda _key: framing, patience=patience
+    ) as connection:
         yield connection
 
 
@@ -260,12 +266,13 @@ async def open_both(
     prepare: Callable[[DdsNode], None] = lambda node: node.introduce(),
     *,
     framing: Framing = Framing.NUMBERED,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[tuple[DdsNode, DdsConnection]]:
     network = some_network()
     with anyio.fail_after(PATIENCE_S):
         async with open_dds_node(network) as node:
             prepare(node)
-            async with open_here(network, framing=framing) as connection:
+            async with open_here(network, framing=framing, patience=patience) as connection:
                 yield node, connection
 
 

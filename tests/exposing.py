@@ -97,7 +97,7 @@ async def exposed(
     """Gives what calls the tools that a system's names are."""
     async with (
         serve_system(system) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
         watched(
             FakeRobot(two_rooms()),
             client,

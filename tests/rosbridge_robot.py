@@ -7,13 +7,13 @@ from typing import Any
 import anyio
 
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
+from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, running
@@ -170,7 +170,6 @@ class ScriptedRobot:
 async def connect_scripted(
     scripted: ScriptedRobot,
     *,
-    timing: Timing,
     patience: Patience,
     overrides: RobotOverrides | None = None,
 ) -> AsyncGenerator[RosRobot]:
@@ -181,7 +180,6 @@ async def connect_scripted(
             open_rosbridge_robot(
                 server.url,
                 overrides=overrides or RobotOverrides(),
-                timing=timing,
                 patience=patience,
             ) as robot,
         ):

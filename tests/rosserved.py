@@ -11,9 +11,10 @@ from mcp.client import Client
 
 from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Guard
@@ -23,7 +24,7 @@ from rosbridge_robot import ScriptedRobot
 from rosbridge_script import PATIENCE_S, running
 from served import text_of
 
-QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
+QUICK = Patience(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
 TOOLSETS = ("drive", "ros")
 
 
@@ -75,7 +76,7 @@ async def on_our_server(
     stepped = robot or SteppedRobot(two_rooms())
     async with (
         open_rosbridge_server(stepped, dialect=dialect) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
         served(stepped, client, folder) as caller,
     ):
         yield stepped, caller
@@ -83,12 +84,12 @@ async def on_our_server(
 
 @asynccontextmanager
 async def on_script(
-    scripted: ScriptedRobot, folder: Path, *, timing: Timing = QUICK, guard: Guard | None = None
+    scripted: ScriptedRobot, folder: Path, *, patience: Patience = QUICK, guard: Guard | None = None
 ) -> AsyncGenerator[Caller]:
     """Gives what calls the tools of a robot that does as the test says."""
     async with (
         running(scripted.server) as server,
-        open_client(RobotAddress(url=server.url), timing=timing) as client,
+        open_client(RobotAddress(url=server.url), patience=patience) as client,
         served(FakeRobot(two_rooms()), client, folder, guard=guard) as caller,
     ):
         yield caller
@@ -103,7 +104,7 @@ async def at_time(
     await robot.sleep(now_s)
     async with (
         running(scripted.server) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
         served(robot, client, folder) as caller,
     ):
         yield client, caller

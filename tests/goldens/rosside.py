@@ -30,7 +30,7 @@ async def ros_robot(dialect: Dialect, folder: Path) -> AsyncGenerator[Transcript
     robot = SteppedRobot(two_rooms())
     async with (
         open_rosbridge_server(robot, dialect=dialect) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
         playing(robot, folder, toolsets=("drive", "ros"), ros=client, is_paced=True) as play,
     ):
         yield play

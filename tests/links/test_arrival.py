@@ -15,14 +15,14 @@ from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.patience import Patience
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import eventually
 from rosbridge_script import PATIENCE_S
-from rosserved import QUICK, time_passing
+from rosserved import time_passing
 from served import text_of
 
 pytestmark = pytest.mark.anyio
@@ -37,7 +37,7 @@ class Desk:
     def __init__(self) -> None:
         self.url = NOBODY
         self.arrival = Arrival(
-            lambda: open_rosbridge_robot(self.url, timing=QUICK, patience=Patience(settling_s=0.0))
+            lambda: open_rosbridge_robot(self.url, patience=Patience(settling_s=0.0))
         )
 
     @asynccontextmanager

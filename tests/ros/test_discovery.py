@@ -6,13 +6,13 @@ from typing import Any
 import pytest
 
 from mapspeak.errors import ConfigError
+from mapspeak.ros.discovery.choosing import choose_profile
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings, load_robot_file
 from mapspeak.ros.discovery.profile import (
     NavigationKind,
     PoseSource,
     RobotPart,
     RobotProfile,
-    choose_profile,
 )
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosGraph

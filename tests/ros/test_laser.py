@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -10,21 +11,20 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import RangeScan
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.ros.messages.scans import LaserScan, write_scan
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot.sensors import Laser
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import Operation
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
-PATIENT = Patience(settling_s=0.0)
+QUICK = Patience(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
+PATIENT = replace(QUICK, settling_s=0.0)
 NOW_S = 100.0
 """What the scripted robot answers when it is asked for the time."""
 BASE = Pose(1.0, 2.0, 0.5)
@@ -80,7 +80,7 @@ def scripted_with(
     return scripted
 
 
-connected = partial(connect_scripted, timing=QUICK, patience=PATIENT)
+connected = partial(connect_scripted, patience=PATIENT)
 
 
 async def fetched(
@@ -223,14 +223,8 @@ async def test_a_robot_without_a_laser_gives_none_at_once() -> None:
 
 async def test_a_silent_laser_is_waited_for_but_once() -> None:
     scripted = scripted_with(None)
-    async with connected(scripted) as robot:
-        laser = Laser(
-            robot.connection,
-            robot.profile,
-            frames=robot._frames,
-            clock=robot._clock,
-            patience_s=0.01,
-        )
+    async with connected(scripted, patience=replace(PATIENT, scan_s=0.01)) as robot:
+        laser = Laser(robot.connection, robot.profile, frames=robot._frames, clock=robot._clock)
         assert await laser.fetch(robot._poses) is None
         assert await laser.fetch(robot._poses) is None
         await scripted.until(lambda: subscriptions(scripted))

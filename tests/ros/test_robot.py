@@ -1,6 +1,7 @@
 """A robot whose offers are found bit by bit, as those of ROS 2 are."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -9,20 +10,19 @@ from drawing import grid_from_text
 from mapspeak.cli.checkup import Health, describe_profile
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import Timing
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.profile import NavigationKind, PoseSource
 from mapspeak.ros.messages.fields import Dialect, write_header
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted
 from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
-PATIENT = Patience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=PATIENCE_S)
-IMPATIENT = Patience(settling_s=0.0)
+QUICK = Patience(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
+PATIENT = replace(QUICK, acceptance_s=PATIENCE_S, end_s=0.05, settling_s=PATIENCE_S)
+IMPATIENT = replace(QUICK, settling_s=0.0)
 N_LOOKS = 3
 MAP = """
 ###
@@ -31,7 +31,7 @@ MAP = """
 """
 
 
-connected = partial(connect_scripted, timing=QUICK, patience=PATIENT)
+connected = partial(connect_scripted, patience=PATIENT)
 
 
 def only_after(n_looks: int, found: object, *, nothing: object) -> Callable[[Operation], object]:

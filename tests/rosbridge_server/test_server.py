@@ -1,18 +1,20 @@
 """The rosbridge server's topics and its manners: what it answers, and where it keeps silent."""
 
+import base64
 import contextlib
+import io
 import json
 from typing import Any
 
 import anyio
 import numpy as np
 import pytest
+from PIL import Image
 
 from bridging import SteppedRobot, bridge
 from fakes import two_rooms
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.protocol.codec import decode_png
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid
 from mapspeak.ros.messages.pictures import read_compressed_image
@@ -59,7 +61,8 @@ async def test_ros_1_hides_a_map_in_a_png() -> None:
         await client.send(op="subscribe", topic="/map", compression="png")
         packed = await client.receive()
     assert packed["op"] == "png"
-    grid = read_grid(json.loads(bytes(decode_png(packed["data"])))["msg"])
+    with Image.open(io.BytesIO(base64.b64decode(packed["data"]))) as picture:
+        grid = read_grid(json.loads(picture.tobytes())["msg"])
     assert robot.grid is not None
     assert np.array_equal(grid.cells, robot.grid.cells)
 

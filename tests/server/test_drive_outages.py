@@ -3,6 +3,7 @@
 import json
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import anyio
@@ -11,10 +12,10 @@ from mcp.client import Client
 
 from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
-from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
+from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.patience import Patience
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_script import PATIENCE_S
@@ -24,9 +25,11 @@ pytestmark = pytest.mark.anyio
 
 RATE = 5.0
 STILL_M = 0.2
-SHORT = Patience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
-LONG = Patience(acceptance_s=PATIENCE_S, end_s=0.5, settling_s=0.0)
-QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, answer_s=0.5)
+QUICK = Patience(
+    first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, answer_s=0.5
+)
+SHORT = replace(QUICK, acceptance_s=0.5, end_s=2.0, settling_s=0.0)
+LONG = replace(QUICK, acceptance_s=PATIENCE_S, end_s=0.5, settling_s=0.0)
 BOTH = pytest.mark.parametrize("dialect", list(Dialect))
 
 
@@ -42,7 +45,7 @@ async def driving(
     with anyio.fail_after(2 * PATIENCE_S):
         async with (
             open_faulty_bridge(dialect, rate=RATE, faults=faults, speed_mps=speed_mps) as bridge,
-            open_rosbridge_robot(bridge.url, timing=QUICK, patience=patience) as robot,
+            open_rosbridge_robot(bridge.url, patience=patience) as robot,
         ):
             session = Session(
                 robot,

@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.actions import ActionState, Patience, SentGoal
+from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.poses import write_pose
 from mapspeak.safety import CommandKind, Policy
@@ -30,7 +31,7 @@ both = pytest.mark.parametrize("dialect", Dialect)
 ACTION = "/navigate_to_pose"
 POSE = {"header": {"frame_id": "map"}, "pose": {"position": {"x": 1.0}, "orientation": {"w": 1.0}}}
 GOAL = {"pose": POSE}
-BRIEF = Patience(acceptance_s=0.3, listing_s=0.05, end_s=0.1, result_s=0.0, return_s=0.05)
+BRIEF = replace(QUICK, acceptance_s=0.3, listing_s=0.05, end_s=0.1, result_s=0.0, return_s=0.05)
 OURS, OTHERS = bytes(range(16)), bytes(range(16, 32))
 
 
@@ -317,12 +318,12 @@ async def sending(
     with anyio.fail_after(PATIENCE_S):
         async with (
             running(scripted.server) as server,
-            open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+            open_client(RobotAddress(url=server.url), patience=BRIEF) as client,
         ):
             memory = SemanticMapStore(folder / "map.yaml")
             session = Session(FakeRobot(two_rooms()), memory, lease_s=60.0, ros=client)
             commands = RosCommands(lambda: client)
-            yield client, ActionBook(RosInquiry(session), commands, patience=BRIEF)
+            yield client, ActionBook(RosInquiry(session), commands)
 
 
 async def lose(scripted: ScriptedRobot, client: RosbridgeClient, *, status: int | None) -> None:
@@ -398,7 +399,7 @@ async def test_on_ros_1_the_list_of_goals_tells_the_end_when_no_result_does(
     scripted = ScriptedRobot(ros=1)
     kind = {"type": "move_base_msgs/MoveBaseActionGoal"}
     scripted.services["/rosapi/topic_type"] = lambda _: kind
-    jobs: list[SentGoal] = []
+    jobs: list[ActionGoal] = []
     async with sending(scripted, tmp_path) as (_, book), anyio.create_task_group() as tasks:
 
         async def pursue() -> None:

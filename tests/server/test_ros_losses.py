@@ -28,7 +28,7 @@ async def losing(
 ) -> AsyncGenerator[tuple[RosbridgeClient, Caller]]:
     async with (
         running(scripted.server) as server,
-        open_client(RobotAddress(url=server.url), timing=IMPATIENT) as client,
+        open_client(RobotAddress(url=server.url), patience=IMPATIENT) as client,
         served(FakeRobot(two_rooms()), client, folder) as caller,
     ):
         yield client, caller

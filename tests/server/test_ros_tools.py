@@ -13,8 +13,9 @@ from PIL import Image
 from bridging import SteppedRobot
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages.fields import Dialect, write_header
+from mapspeak.ros.patience import Patience
 from mapspeak.server.tools.ros.reading import hear
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_robot import ScriptedRobot
@@ -344,7 +345,7 @@ async def test_a_latched_message_that_was_missed_is_asked_for_again() -> None:
     scripted.n_silent["/map"] = 2
     async with (
         running(scripted.server) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
     ):
         heard = await hear(
             client,
@@ -391,8 +392,8 @@ async def test_a_rosbridge_that_has_gone_is_an_error_and_no_empty_list(
     tmp_path: Path, tool: str
 ) -> None:
     scripted = ScriptedRobot()
-    timing = Timing(first_pause_s=0.001, longest_pause_s=0.01, answer_s=0.1, goodbye_s=0.1)
-    async with on_script(scripted, tmp_path, timing=timing) as caller:
+    patience = Patience(first_pause_s=0.001, longest_pause_s=0.01, answer_s=0.1, goodbye_s=0.1)
+    async with on_script(scripted, tmp_path, patience=patience) as caller:
         scripted.server.hangs_up = True
         await scripted.server.drop_all()
         text = await caller.refuse(tool)

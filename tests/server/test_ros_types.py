@@ -84,7 +84,7 @@ async def test_a_type_that_the_ros_of_this_machine_lacks_is_to_be_installed(
 ) -> None:
     async with (
         open_rosbridge_server(SteppedRobot(two_rooms()), dialect=Dialect.ROS2) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
         served(FakeRobot(), WithoutPackages(client), tmp_path) as caller,
     ):
         said = await caller.refuse("ros_type", type="nav2_msgs/action/Spin")

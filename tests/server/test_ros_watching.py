@@ -27,7 +27,7 @@ async def serving(
     """Serves the robot itself, with its brake and its way of driving."""
     async with (
         running(scripted.server) as server,
-        open_rosbridge_robot(server.url, timing=QUICK) as robot,
+        open_rosbridge_robot(server.url, patience=QUICK) as robot,
     ):
         memory = SemanticMapStore(folder / "semantic_map.yaml")
         session = Session(robot, memory, lease_s=60.0, ros=robot.connection)

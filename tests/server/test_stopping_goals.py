@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import anyio
@@ -13,8 +14,8 @@ from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from guarding import MONDAY_NOON, make_guard
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.patience import Patience
 from mapspeak.safety import CommandKind, Guard, Patterns, Policy
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
@@ -25,8 +26,8 @@ from rosserved import QUICK, Caller
 pytestmark = pytest.mark.anyio
 
 RATE = 5.0
-SHORT = Patience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
-LONG = Patience(acceptance_s=PATIENCE_S, end_s=2.0, settling_s=0.0)
+SHORT = replace(QUICK, acceptance_s=0.5, end_s=2.0, settling_s=0.0)
+LONG = replace(QUICK, acceptance_s=PATIENCE_S, end_s=2.0, settling_s=0.0)
 PATROL = "/patrol"
 EXECUTING = 2
 TYPE = "nav2_msgs/action/FollowWaypoints"
@@ -73,7 +74,7 @@ async def test_a_stop_ends_goals_of_any_action(tmp_path: Path, stop: str) -> Non
     allowed = {CommandKind.ACT: Patterns(allow=("*", PATROL))}
     patrol, guard = Patrol(scripted), make_guard(tmp_path, Policy(patterns=allowed))
     async with (
-        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        connect_scripted(scripted, patience=LONG) as robot,
         serving(robot, tmp_path, guard=guard) as (session, caller),
     ):
         running = await caller.ask("ros_send_goal", action=PATROL, fields={}, wait_s=0)
@@ -100,7 +101,7 @@ async def test_a_goal_to_navigation_that_a_ros_tool_sent_is_no_other_clients(
 ) -> None:
     scripted = ScriptedRobot()
     async with (
-        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        connect_scripted(scripted, patience=LONG) as robot,
         serving(robot, tmp_path) as (_, caller),
     ):
         await caller.ask(
@@ -116,9 +117,9 @@ async def test_a_goal_to_navigation_that_a_ros_tool_sent_is_no_other_clients(
 async def test_a_stop_that_cannot_end_a_goal_says_which(tmp_path: Path) -> None:
     scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
     scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
-    brief = Patience(acceptance_s=PATIENCE_S, end_s=0.1, settling_s=0.0)
+    brief = replace(QUICK, acceptance_s=PATIENCE_S, end_s=0.1, settling_s=0.0)
     async with (
-        connect_scripted(scripted, timing=QUICK, patience=brief) as robot,
+        connect_scripted(scripted, patience=brief) as robot,
         serving(robot, tmp_path) as (_, caller),
     ):
         await caller.ask("ros_send_goal", action=PATROL, fields={}, wait_s=0)
@@ -137,7 +138,7 @@ async def test_a_stop_that_nobody_hears_is_told_though_a_goal_was_sent_before(
     scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
     scripted.services["/rosapi/subscribers"] = lambda _: {"subscribers": []}
     async with (
-        connect_scripted(scripted, timing=QUICK, patience=SHORT) as robot,
+        connect_scripted(scripted, patience=SHORT) as robot,
         serving(robot, tmp_path) as (_, caller),
     ):
         scripted.accepts_goals = False
@@ -154,7 +155,7 @@ async def test_a_stop_publishes_zero_velocity_wherever_a_velocity_was_published(
     scripted = ScriptedRobot()
     scripted.topics["/arm/cmd_vel"] = "geometry_msgs/msg/Twist"
     async with (
-        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        connect_scripted(scripted, patience=LONG) as robot,
         serving(robot, tmp_path) as (_, caller),
     ):
         message = {"linear": {"x": 0.2}}
@@ -182,7 +183,7 @@ async def driving(
     with anyio.fail_after(PATIENCE_S):
         async with (
             open_faulty_bridge(Dialect.ROS1, rate=RATE, faults=faults) as bridge,
-            open_rosbridge_robot(bridge.url, timing=QUICK, patience=patience) as robot,
+            open_rosbridge_robot(bridge.url, patience=patience) as robot,
             serving(robot, folder) as (_, caller),
         ):
             yield bridge, caller
@@ -215,7 +216,7 @@ async def test_a_goal_that_was_called_rejected_does_not_drive_the_robot_later(
 
 
 async def test_the_base_is_stopped_when_navigation_dies_under_a_drive(tmp_path: Path) -> None:
-    watchful = Patience(acceptance_s=PATIENCE_S, return_s=0.3, settling_s=0.0)
+    watchful = replace(QUICK, acceptance_s=PATIENCE_S, return_s=0.3, settling_s=0.0)
     faults = Faults(has_watchdog=False)
     async with driving(tmp_path, patience=watchful, faults=faults) as (bridge, caller):
         await send(caller, "navigate_to")
@@ -239,7 +240,7 @@ async def test_a_goal_that_is_still_being_prepared_at_a_stop_is_not_sent(tmp_pat
     scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
     types = anyio.Event()
     async with (
-        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        connect_scripted(scripted, patience=LONG) as robot,
         serving(robot, tmp_path) as (_, caller),
     ):
         said: list[str] = []

@@ -148,14 +148,14 @@ class ActionWire:
             return
         if not self._send.tells_whom:
             with anyio.move_on_after(SECOND_THOUGHT_S):
-                while not goal.is_accepted and goal.goal_id in self._goals:
+                while not goal.is_accepted and goal.id in self._goals:
                     await self._is_named.wait()
-        if goal.goal_id not in self._goals or goal.is_accepted:
+        if goal.id not in self._goals or goal.is_accepted:
             return
         if answer["accepted"]:
-            self._accept(goal.goal_id)
+            self._accept(goal.id)
         else:
-            del self._goals[goal.goal_id]
+            del self._goals[goal.id]
             goal.take_end(REFUSED)
 
     def _tell_named(self) -> None:

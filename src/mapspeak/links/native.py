@@ -25,6 +25,7 @@ from mapspeak.links.goals import ActionWire, ServiceClient
 from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.link import RosLink, TopicRequest, check_name, wrong_type
 from mapspeak.ros.messages.fields import TYPE, Dialect, Message, bare_type
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import OwnEnds, RosGraph
 
 SEND_GOAL = "/_action/send_goal"
@@ -90,16 +91,14 @@ class NativeLink(RosLink[NativeRequest]):
 
     Attributes:
         reads_anew: A topic is read anew when somebody new writes it.
-        answer_s: For a service's answer, where the caller says nothing else.
         server_s: For somebody who serves to be found: right after opening, not all are known.
     """
 
     reads_anew = False
-    answer_s = 5.0
     server_s = 2.0
 
-    def __init__(self, types: MessageTypes) -> None:
-        super().__init__(NativeRequest)
+    def __init__(self, types: MessageTypes, patience: Patience) -> None:
+        super().__init__(NativeRequest, patience)
         self._types = types
         self._advertised: dict[str, tuple[str, Any]] = {}
         self._actions: dict[str, ActionWire] = {}
@@ -289,7 +288,7 @@ class NativeLink(RosLink[NativeRequest]):
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
         """Return what a service answers."""
-        limit_s = self.answer_s if timeout_s is None else timeout_s
+        limit_s = self.patience.answer_s if timeout_s is None else timeout_s
         answer = await self._call(service, arguments or {}, type_name=type_name, timeout_s=limit_s)
         content: dict[str, Any] = answer.content
         return content
@@ -316,12 +315,14 @@ class NativeLink(RosLink[NativeRequest]):
             raise wrong_type(action, str(found), type_name)
         if action not in self._actions:
             await self._open_action(action)
-        return await self._actions[action].send_goal(action, arguments, timeout_s=self.answer_s)
+        return await self._actions[action].send_goal(
+            action, arguments, timeout_s=self.patience.answer_s
+        )
 
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Ask for the end of a goal; its `end` tells whether that worked."""
         if goal.action in self._actions:
-            self._actions[goal.action].cancel_goal(goal.goal_id)
+            self._actions[goal.action].cancel_goal(goal.id)
 
     async def _open_action(self, action: str) -> None:
         send, result, cancel = [

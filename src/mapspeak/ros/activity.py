@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, Protocol
 
 import anyio
@@ -66,9 +67,32 @@ class Subscription:
         return self.latest
 
 
+class ActionState(StrEnum):
+    """How a goal of an action stands."""
+
+    SENT = "sent"
+    ACCEPTED = "accepted"
+    RUNNING = "running"
+    CANCELLING = "cancelling"
+    SUCCEEDED = "succeeded"
+    ABORTED = "aborted"
+    CANCELLED = "cancelled"
+    REJECTED = "rejected"
+    LOST = "lost"
+
+    @property
+    def is_final(self) -> bool:
+        """True when nothing more will happen."""
+        return ORDER.index(self) >= ORDER.index(ActionState.SUCCEEDED)
+
+
+ORDER = list(ActionState)
+LONGEST_REASON = 300
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActionEnd:
-    """The end of a goal.
+    """The end of a goal, as a connection tells it.
 
     Attributes:
         status: As in action_msgs/GoalStatus: 4 succeeded, 5 cancelled, 6 aborted; None if unsaid.
@@ -86,52 +110,142 @@ REFUSED = ActionEnd(status=None, is_result=False, values="")
 
 
 class ActionGoal:
-    """What a connection tells of one goal of a ROS 2 action. It is kept after its end.
+    """A goal of ours: what its connection tells of it, and how it stands by all that is heard.
+
+    Once over its state stays, and only its result may still come.
 
     Attributes:
-        goal_id: The id it was sent with.
-        ros_id: The UUID under which the action server knows it, 32 hex digits; None where unknown.
-        is_accepted: The server is known to have taken it; rosbridge does not tell.
+        id: The one it was sent with.
+        ros_id: The id by which the connection knows it at the action server, 32 hex digits of a
+            UUID on ROS 2; None where it does not, as over rosbridge.
+        is_accepted: The connection says that the server has taken it; rosbridge does not tell.
         is_lost: What would have brought its end is gone; the robot may still drive.
+        end: As the connection has told it.
+        feedback: The latest.
+        type: Of the action.
+        n_seen: How many goals the server had listed before.
+        owner: The client with whom it ends; None where somebody else sees to that.
+        server_id: What the action server calls it; None where that is unknown.
+        silent_s: Robot time since the latest feedback, as far as somebody looked.
+        reason: Why it ended so, where that was said.
+        afterwards: What became of a withdrawn goal that the server took after all.
+        is_withdrawn: We said that it was over before the server did: should the server take it,
+            or still have it, it is cancelled.
+        is_settled: The server has ended a withdrawn goal, or never had it.
+        sent_s: When it was sent, by the event loop's clock, as are the others.
+        heard_s: When the connection last told of it.
+        listed_end_s: When the list of all goals first told its end; None before.
+        taken_feedback: The latest feedback that was taken in.
+        n_lists_at_loss: How many lists had come when the connection lost it; None before.
+        n_lists_at_end: How many had come when it was withdrawn.
     """
 
     def __init__(self, *, goal_id: str, action: str, ros_id: str | None = None) -> None:
-        self.goal_id = goal_id
+        self.id = goal_id
         self.action = action
-        self.ros_id = ros_id
-        self.is_accepted = False
-        self.feedback: Message | None = None
+        self.ros_id = self.server_id = ros_id
+        self.is_accepted = self.is_lost = False
         self.end: ActionEnd | None = None
-        self.is_lost = False
+        self.feedback: Message | None = None
+        self.type = ""
+        self.n_seen = 0
+        self.owner: str | None = None
+        self.state = ActionState.SENT
+        self.n_feedback = 0
+        self.silent_s = 0.0
+        self.result: Message | None = None
+        self.reason = self.afterwards = ""
+        self.is_withdrawn = self.is_settled = False
+        self.sent_s = self.heard_s = anyio.current_time()
+        self.ended_s: float | None = None
+        self.listed_end_s: float | None = None
+        self.taken_feedback: Message | None = None
+        self.n_lists_at_loss: int | None = None
+        self.n_lists_at_end = 0
         self._listeners: list[Callable[[], None]] = []
+        self._news = anyio.Event()
+
+    # --- what the connection tells
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call a function whenever something is said about the goal; it must not raise."""
+        """Call a function whenever the connection tells of the goal; it must not raise."""
         self._listeners.append(listener)
 
     def take_acceptance(self) -> None:
         """Note that the server has taken it."""
         self.is_accepted = True
-        self._tell()
+        self._hear()
 
     def take_feedback(self, feedback: Message) -> None:
         """Keep the latest feedback."""
         self.feedback = feedback
-        self._tell()
+        self._hear()
 
     def take_end(self, end: ActionEnd) -> None:
         """Keep how it ended."""
         self.end = end
-        self._tell()
+        self._hear()
 
     def take_loss(self) -> None:
         """Note that nothing more will be heard this way."""
         self.is_lost = True
+        self._hear()
+
+    def _hear(self) -> None:
+        for listener in self._listeners:
+            listener()
+
+    # --- how it stands
+
+    @property
+    def is_over(self) -> bool:
+        """True when nothing more will happen."""
+        return self.state.is_final
+
+    def move_on(self, state: ActionState) -> None:
+        """Note how it stands now; a goal does not go back."""
+        if not self.is_over and ORDER.index(state) > ORDER.index(self.state):
+            self.state = state
+            self._tell()
+
+    def count_feedback(self) -> None:
+        """Note that the latest feedback is new, and says that the goal is being pursued."""
+        self.taken_feedback = self.feedback
+        if not self.is_over:
+            self.n_feedback += 1
+            self.silent_s = 0.0
+            self.move_on(ActionState.RUNNING)
+
+    def finish(
+        self, state: ActionState, *, reason: str = "", result: Message | None = None
+    ) -> None:
+        """Note how it ended; the first word counts, and a result may follow it."""
+        if self.result is None:
+            self.result = result
+        if not self.is_over:
+            self.state, self.reason = state, " ".join(reason.split())[:LONGEST_REASON]
+            self.ended_s = anyio.current_time()
+            self._tell()
+
+    def settle(self) -> None:
+        """Note that the server has ended a withdrawn goal."""
+        self.is_settled = True
         self._tell()
 
     def _tell(self) -> None:
-        for listener in self._listeners:
-            listener()
+        news, self._news = self._news, anyio.Event()
+        news.set()
+
+    async def wait_until_over(self, *, within_s: float) -> bool:
+        """Return at its end, or after so long; True at its end."""
+        return await self.wait_until(lambda: self.is_over, within_s=within_s)
+
+    async def wait_until(self, is_so: Callable[[], bool], *, within_s: float) -> bool:
+        """Return when something has come true of it, or after so long; True when it has."""
+        with anyio.move_on_after(within_s):
+            while not is_so():
+                await self._news.wait()
+        return is_so()
 
 
 class Startable(Protocol):

@@ -14,6 +14,7 @@ from mapspeak.errors import LinkError
 from mapspeak.ros.activity import Started, Subscription
 from mapspeak.ros.messages.fields import NAME, Message, bare_type
 from mapspeak.ros.parameters import ParameterServices
+from mapspeak.ros.patience import Patience
 
 NOTICE_S = 0.3
 """From a topic's first announcement until the robot's nodes listen, in wall time."""
@@ -102,7 +103,8 @@ Request = TypeVar("Request", bound=TopicRequest)
 class RosLink(ParameterServices, Generic[Request]):
     """The part of the port that is the same over every connection; it raises what the port says."""
 
-    def __init__(self, request_type: type[Request]) -> None:
+    def __init__(self, request_type: type[Request], patience: Patience) -> None:
+        self.patience = patience
         self._request_type = request_type
         self.started = Started()
         self.requests: dict[str, Request] = {}

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
 from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.ros.patience import Patience
 
 
 def new_id() -> str:
@@ -101,6 +102,10 @@ class RosConnection(Protocol):
     @property
     def link(self) -> LinkName:
         """How we are connected."""
+
+    @property
+    def patience(self) -> Patience:
+        """How long to wait for what, on this connection."""
 
     @property
     def is_open(self) -> bool:

@@ -27,7 +27,6 @@ from mapspeak.rosbridge_server.nav2 import (
     ACTION,
     ACTION_TYPE,
     TF_ERROR,
-    Nav2,
     result_of,
     status_of,
 )
@@ -36,86 +35,6 @@ Operation = Mapping[str, Any]
 LONGEST_MESSAGE = 10_000_000
 """rosbridge's `max_message_size`: on ROS 2 longer text is cut in pieces."""
 FEEDBACK_DEPTH = 5
-
-
-class GoalOperations:
-    """One client's goals; the ids of all clients' goals share one dictionary, as in rosbridge."""
-
-    def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
-        self._stack = stack
-        self._outbox = outbox
-        self._tasks = tasks
-        self._blocks = blocks
-
-    async def send(self, operation: Operation) -> None:
-        """Carry out `send_action_goal`."""
-        if self._blocks:
-            await self._carry_out(operation)
-        else:
-            self._tasks.start_soon(self._carry_out, operation)
-
-    async def cancel(self, operation: Operation) -> None:
-        """Carry out `cancel_action_goal`; nothing is ever answered."""
-        if self._stack.nav2 is not None:
-            await self._stack.nav2.cancel_operation(str(operation.get("id")))
-
-    async def _carry_out(self, operation: Operation) -> None:
-        action, action_type = operation.get("action"), operation.get("action_type")
-        nav2 = self._stack.nav2
-        if nav2 is None or not isinstance(action, str) or not isinstance(action_type, str):
-            return
-        if f"/{action.strip('/')}" != ACTION:
-            return
-        try:
-            if bare_type(action_type) != ACTION_TYPE:
-                raise LinkError(f"{ACTION} is no {action_type}.", hint=f"It is a {ACTION_TYPE}.")
-            args = operation.get("args") or {}
-            drive = await nav2.navigate(self._stack.interfaces.fill(f"{ACTION_TYPE}_Goal", args))
-        except MapspeakError as error:
-            if self._blocks and not isinstance(error, LinkError):
-                # Version 2.1 never says that a goal is rejected, and blocks the socket for ever.
-                await anyio.sleep_forever()
-            self._answer(operation, refusal(error), status=0, is_done=False)
-            return
-        if isinstance(drive, str):
-            values = {"error_code": TF_ERROR, "error_msg": drive}
-            self._answer(operation, values, status=ABORTED, is_done=True)
-            return
-        await self._feed_back(nav2, operation, drive)
-        self._answer(operation, result_of(drive), status=status_of(drive), is_done=True)
-
-    async def _feed_back(self, nav2: Nav2, operation: Operation, drive: ServedDrive) -> None:
-        """Pass the feedback on until the drive is over; to a slow client only the latest."""
-        lane = f"goal {operation.get('id')}"
-        answer = {"op": "action_feedback", "action": operation["action"]}
-
-        def pass_on(about: ServedDrive, feedback: dict[str, Any]) -> None:
-            if about is drive:
-                frame = answer_frame(operation, {**answer, "values": feedback})
-                self._outbox.offer(lane, frame)
-
-        if operation.get("feedback") is True:
-            self._outbox.open_lane(lane, depth=FEEDBACK_DEPTH, throttle_s=0.0, holds_back=False)
-        operation_id = str(operation.get("id"))
-        nav2.by_operation[operation_id] = drive
-        nav2.followers.append(pass_on)
-        try:
-            await drive.is_over.wait()
-        finally:
-            nav2.followers.remove(pass_on)
-            self._outbox.close_lane(lane)
-            if nav2.by_operation.get(operation_id) is drive:
-                del nav2.by_operation[operation_id]
-
-    def _answer(self, operation: Operation, values: object, *, status: int, is_done: bool) -> None:
-        answer = {
-            "op": "action_result",
-            "action": operation["action"],
-            "values": values,
-            "status": status,
-            "result": is_done,
-        }
-        self._outbox.reply(answer_frame(operation, answer))
 
 
 TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?", re.ASCII)
@@ -156,9 +75,10 @@ class ClientConversation:
     def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
         self._stack = stack
         self._outbox = outbox
+        self._tasks = tasks
+        self._blocks = blocks
         self._subscriptions: dict[str, ClientSubscription] = {}
         self._advertised: dict[str, set[str]] = {}
-        self._goals = GoalOperations(stack, outbox, tasks, blocks=blocks)
         self._fragment_length: int | None = None
         self._operations = {
             "subscribe": self._subscribe,
@@ -169,8 +89,8 @@ class ClientConversation:
             "call_service": self._call_service,
         }
         if stack.dialect is Dialect.ROS2:
-            self._operations["send_action_goal"] = self._goals.send
-            self._operations["cancel_action_goal"] = self._goals.cancel
+            self._operations["send_action_goal"] = self._send_goal
+            self._operations["cancel_action_goal"] = self._cancel_goal
 
     def frames_of(self, item: Frame | Publication) -> Iterable[Frame]:
         """Return an answer or a message as the client wants it; a long text is cut up.
@@ -298,6 +218,65 @@ class ClientConversation:
         else:
             answer |= {"values": values, "result": True}
         self._outbox.reply(answer_frame(operation, answer))
+
+    # --- goals ---
+
+    async def _send_goal(self, operation: Operation) -> None:
+        if self._blocks:
+            await self._pursue(operation)
+        else:
+            self._tasks.start_soon(self._pursue, operation)
+
+    async def _cancel_goal(self, operation: Operation) -> None:
+        """Cancel a goal of any client: their ids are one dictionary in rosbridge; no answer."""
+        if self._stack.nav2 is not None:
+            await self._stack.nav2.cancel_operation(_id(operation))
+
+    async def _pursue(self, operation: Operation) -> None:
+        action, action_type = operation.get("action"), operation.get("action_type")
+        nav2 = self._stack.nav2
+        if nav2 is None or not isinstance(action, str) or not isinstance(action_type, str):
+            return
+        if f"/{action.strip('/')}" != ACTION:
+            return
+        try:
+            if bare_type(action_type) != ACTION_TYPE:
+                raise LinkError(f"{ACTION} is no {action_type}.", hint=f"It is a {ACTION_TYPE}.")
+            args = operation.get("args") or {}
+            drive = await nav2.navigate(self._stack.interfaces.fill(f"{ACTION_TYPE}_Goal", args))
+        except MapspeakError as error:
+            if self._blocks and not isinstance(error, LinkError):
+                # Version 2.1 never says that a goal is rejected, and blocks the socket for ever.
+                await anyio.sleep_forever()
+            self._end_goal(operation, refusal(error), status=0, is_done=False)
+            return
+        if isinstance(drive, str):
+            values = {"error_code": TF_ERROR, "error_msg": drive}
+            self._end_goal(operation, values, status=ABORTED, is_done=True)
+            return
+        await self._follow(operation, drive)
+        self._end_goal(operation, result_of(drive), status=status_of(drive), is_done=True)
+
+    async def _follow(self, operation: Operation, drive: ServedDrive) -> None:
+        """Pass the feedback on until the drive is over; to a slow client only the latest."""
+        lane = f"goal {_id(operation)}"
+        answer = {"op": "action_feedback", "action": operation["action"]}
+        if operation.get("feedback") is True:
+            self._outbox.open_lane(lane, depth=FEEDBACK_DEPTH, throttle_s=0.0, holds_back=False)
+        drive.operation_id = _id(operation)
+        drive.follow = lambda feedback: self._outbox.offer(
+            lane, answer_frame(operation, {**answer, "values": feedback})
+        )
+        try:
+            await drive.is_over.wait()
+        finally:
+            drive.follow = None
+            self._outbox.close_lane(lane)
+
+    def _end_goal(self, asked: Operation, values: object, *, status: int, is_done: bool) -> None:
+        ended = {"values": values, "status": status, "result": is_done}
+        answer = {"op": "action_result", "action": asked["action"], **ended}
+        self._outbox.reply(answer_frame(asked, answer))
 
     # --- inside ---
 

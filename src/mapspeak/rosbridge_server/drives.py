@@ -3,6 +3,7 @@
 import uuid
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import anyio
 
@@ -24,6 +25,8 @@ class ServedDrive:
         goal_id: The client's, or one made here.
         robot_goal_id: The robot's; None for a goal in a frame that nobody knows.
         started_s: Robot time.
+        operation_id: Of rosbridge's operation that waits for its end.
+        follow: Takes the feedback for that operation.
     """
 
     goal_id: str
@@ -32,6 +35,8 @@ class ServedDrive:
     status: GoalStatus
     is_cancelling: bool = False
     is_over: anyio.Event = field(default_factory=anyio.Event)
+    operation_id: str = ""
+    follow: Callable[[dict[str, Any]], None] | None = None
 
 
 class Drives:

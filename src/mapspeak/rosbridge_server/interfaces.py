@@ -6,9 +6,9 @@ from types import MappingProxyType
 from typing import Any
 
 import anyio.abc
-import numpy as np
 
 from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros.definitions.checking import check_field
 from mapspeak.ros.definitions.texts import GENERATED, known_definitions, write_definition
 from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
 from mapspeak.ros.definitions.typestore import name_in_ros2
@@ -90,37 +90,19 @@ class Interfaces:
         }
 
     def _fill_field(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
+        if not field.is_message and field.type not in TIMES:
+            return check_field(self._book, field, value, path=field.name)
         if field.length is None:
-            return self._fill_value(field, value)
-        if field.type == "uint8" and isinstance(value, str | bytes):
-            return value
-        is_list = isinstance(value, list | tuple | np.ndarray)
-        if not is_list or (field.length and len(value) != field.length):  # type: ignore[arg-type]
+            return self._fill_message(field, value)
+        if not isinstance(value, list | tuple) or (field.length and len(value) != field.length):
             raise _misfit(field.type, field.name, value)
-        if isinstance(value, np.ndarray):
-            return value
-        return [self._fill_value(field, each) for each in value]  # type: ignore[attr-defined]
+        return [self._fill_message(field, each) for each in value]
 
-    def _fill_value(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        match field.type:
-            case "string" if isinstance(value, str) and _is_unicode(value):
-                return value
-            case "bool" if isinstance(value, bool | int):
-                return bool(value)
-            case kind if kind in FLOATS and is_number:
-                return value
-            case kind if kind in WHOLES and is_number and isinstance(value, int):
-                low, high = WHOLES[kind]
-                if low <= value <= high:
-                    return value
-            case kind if kind in TIMES and isinstance(value, Mapping):
-                # A stamp in the words of ROS 2 is silently replaced.
-                is_known = {"secs", "nsecs"} <= set(value)
-                return dict(value) if is_known else {"secs": 0, "nsecs": 0}
-            case kind if self._book.knows(kind):
-                return self.fill(kind, value)
-        raise _misfit(field.type, field.name, value)
+    def _fill_message(self, field: Field, value: object) -> dict[str, Any]:
+        if field.type in TIMES and isinstance(value, Mapping):
+            # A stamp in the words of ROS 2 is silently replaced.
+            value = value if {"secs", "nsecs"} <= set(value) else {"secs": 0, "nsecs": 0}
+        return self.fill(field.type, value)
 
     def _detail(self, name: str) -> dict[str, object]:
         message = self._book[name]
@@ -135,11 +117,6 @@ class Interfaces:
             "constnames": list(message.constants),
             "constvalues": list(message.constants.values()),
         }
-
-
-def _is_unicode(text: str) -> bool:
-    """Return False for half a surrogate pair, which JSON can say and no wire can carry."""
-    return not any("\ud800" <= sign <= "\udfff" for sign in text)
 
 
 def _example(field: Field) -> str:

@@ -2,7 +2,6 @@
 
 import base64
 import uuid
-from collections.abc import Callable
 from typing import Any
 
 from mapspeak.errors import MapspeakError
@@ -31,27 +30,22 @@ FARTHEST_M = 1e8
 
 
 class Nav2:
-    """The action server, its topics `feedback` and `status`, and its service `cancel_goal`.
-
-    Attributes:
-        followers: Called with each feedback.
-        by_operation: The goals under way by the id of rosbridge's operation, of all clients.
-    """
+    """The action server, its topics `feedback` and `status`, and its service `cancel_goal`."""
 
     def __init__(self, robot: Robot, hub: Hub, drives: Drives) -> None:
         self._robot = robot
         self._hub = hub
         self._drives = drives
         self._statuses: dict[ServedDrive, int] = {}
-        self.followers: list[Callable[[ServedDrive, dict[str, Any]], None]] = []
-        self.by_operation: dict[str, ServedDrive] = {}
         drives.listeners.append(self._tell)
         hub.publish(f"{ACTION}/_action/status", {"status_list": []})
 
     async def cancel_operation(self, operation_id: str) -> None:
         """Ask the drive of one of rosbridge's operations to end, if it is under way."""
-        if operation_id in self.by_operation:
-            await self._drives.cancel(self.by_operation[operation_id])
+        for drive in reversed(self._drives.under_way):
+            if drive.operation_id == operation_id:
+                await self._drives.cancel(drive)
+                return
 
     async def navigate(self, args: dict[str, Any]) -> ServedDrive | str:
         """Start a drive for a goal of the action; return a text where the goal is aborted at once.
@@ -72,7 +66,7 @@ class Nav2:
             return
 
     def publish_feedback(self, drive: ServedDrive, here: FramedPose) -> None:
-        """Publish how far a goal's drive has come, and tell the followers."""
+        """Publish how far a goal's drive has come, and tell the client that follows it."""
         left_m = min(drive.status.distance_left_m or 0.0, FARTHEST_M)
         passed_s = self._robot.now_s - drive.started_s
         feedback = {
@@ -84,8 +78,8 @@ class Nav2:
         }
         message = {"goal_id": _uuid_message(drive), "feedback": feedback}
         self._hub.publish(f"{ACTION}/_action/feedback", message)
-        for follow in self.followers:
-            follow(drive, feedback)
+        if drive.follow is not None:
+            drive.follow(feedback)
 
     async def cancel_goals(self, request: dict[str, Any]) -> dict[str, Any]:
         """Answer action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""

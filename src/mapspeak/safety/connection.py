@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
 from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import LinkName, NodeLinks, OwnEnds, RosConnection, RosGraph
 from mapspeak.safety.commands import (
     Act,
@@ -229,7 +230,7 @@ class GuardedConnection:
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Ask for the end of a goal that the server has taken; its `end` tells if that worked."""
         self._connection.cancel_goal(goal)
-        self._guard.note_event("stop", f"cancelled {goal.goal_id}", robot_s=self._now_s())
+        self._guard.note_event("stop", f"cancelled {goal.id}", robot_s=self._now_s())
 
     def give_up_goal(self, goal: ActionGoal) -> None:
         """Let a goal without a sign of life hold up nothing; what is heard of it is told on."""
@@ -240,6 +241,11 @@ class GuardedConnection:
         self._connection.clear_the_way()
 
     # --- what reads ---
+
+    @property
+    def patience(self) -> Patience:
+        """How long to wait for what."""
+        return self._connection.patience
 
     @property
     def is_open(self) -> bool:

@@ -14,9 +14,10 @@ from dds_node import until as until_so
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.ros.actions import ActionState, Patience, open_action
-from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.actions import open_action
+from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 
 pytestmark = pytest.mark.anyio
 
@@ -107,12 +108,12 @@ class Counter:
 
 @asynccontextmanager
 async def open_counter(
-    framing: Framing = Framing.NUMBERED,
+    framing: Framing = Framing.NUMBERED, *, patience: Patience = USUAL_PATIENCE
 ) -> AsyncGenerator[tuple[Counter, DdsConnection]]:
     network = some_network()
     async with open_dds_node(network) as node:
         counter = Counter(node, framing=framing)
-        async with open_here(network, framing=framing) as connection:
+        async with open_here(network, framing=framing, patience=patience) as connection:
             yield counter, connection
 
 
@@ -237,11 +238,9 @@ async def test_a_goal_is_lost_with_its_server_though_another_was_started_since()
 async def test_a_goal_that_is_taken_too_late_is_cancelled_at_once(
     framing: Framing, *, is_stopped: bool
 ) -> None:
-    async with open_counter(framing) as (counter, connection):
+    async with open_counter(framing, patience=BRIEF) as (counter, connection):
         counter.is_slow = True
-        client = open_action(
-            connection, ACTION, dialect=Dialect.ROS2, type_name=TYPE, patience=BRIEF
-        )
+        client = open_action(connection, ACTION, dialect=Dialect.ROS2, type_name=TYPE)
         goal = await client.send({"order": 3}, through=connection)
         await client.wait_until_taken(goal)
         assert goal.state is ActionState.REJECTED
@@ -256,7 +255,7 @@ async def test_a_goal_that_is_taken_too_late_is_cancelled_at_once(
 async def test_a_goal_that_was_ended_before_it_was_taken_is_cancelled_when_it_is(
     framing: Framing,
 ) -> None:
-    async with open_counter(framing) as (counter, connection):
+    async with open_counter(framing, patience=BRIEF) as (counter, connection):
         counter.is_slow = True
         client = open_action(connection, ACTION, dialect=Dialect.ROS2, type_name=TYPE)
         goal = await client.send({"order": 3}, through=connection)

@@ -1,32 +1,32 @@
 """A stop over DDS, where being connected does not mean that anybody hears it."""
 
+from functools import partial
+
 import pytest
 
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
-from dds_node import open_both, until
+from dds_node import DdsNode, open_both, until
 from mapspeak.errors import LinkError
-from mapspeak.ros.actions import Patience
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import build_ros_robot
 
 pytestmark = pytest.mark.anyio
 
-AT_ONCE = Patience(settling_s=0.0)
+AT_ONCE = Patience(settling_s=0.0, frames_s=0.0)
 
 
 async def test_a_stop_with_no_robot_there_says_that_nobody_was_told() -> None:
-    async with open_both() as (_, connection):
-        robot = await build_ros_robot(connection, patience=AT_ONCE, frames_s=0.0)
+    async with open_both(patience=AT_ONCE) as (_, connection):
+        robot = await build_ros_robot(connection)
         with pytest.raises(LinkError, match="Nobody could be told"):
             await robot.stop()
 
 
 async def test_a_stop_of_a_robot_that_hears_velocities_is_enough() -> None:
-    async with open_both(lambda node: node.listen("/cmd_vel", "geometry_msgs/msg/Twist")) as (
-        node,
-        connection,
-    ):
-        robot = await build_ros_robot(connection, patience=AT_ONCE, frames_s=0.0)
+    listening = partial(DdsNode.listen, topic="/cmd_vel", type_name="geometry_msgs/msg/Twist")
+    async with open_both(listening, patience=AT_ONCE) as (node, connection):
+        robot = await build_ros_robot(connection)
         await robot.stop()
         await until(lambda: node.heard["/cmd_vel"])
     assert node.heard["/cmd_vel"][0]["linear"] == {"x": 0.0, "y": 0.0, "z": 0.0}

@@ -14,10 +14,11 @@ import pytest
 
 from benchmarks.mutations import mutate, seed_frames
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.links.rosbridge.connection import MAX_REFUSED
 from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
 from mapspeak.links.rosbridge.websocket import MAX_PARTS, MAX_SKIPPED_BYTES
+from mapspeak.ros.patience import Patience
 from rosbridge_script import (
     PATIENCE_S,
     Operation,
@@ -29,7 +30,7 @@ from rosbridge_script import (
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
+QUICK = Patience(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
 TWIST = "geometry_msgs/msg/Twist"
 OLD_CBOR = """
 class CBOREncoder: ...
@@ -42,12 +43,12 @@ def loads(data, tag_hook=None): return None
 
 @asynccontextmanager
 async def connected(
-    server: ScriptedServer, timing: Timing = QUICK
+    server: ScriptedServer, patience: Patience = QUICK
 ) -> AsyncGenerator[RosbridgeClient]:
     with anyio.fail_after(PATIENCE_S):
         async with (
             running(server),
-            open_client(RobotAddress(url=server.url), timing=timing) as client,
+            open_client(RobotAddress(url=server.url), patience=patience) as client,
         ):
             yield client
 
@@ -68,7 +69,7 @@ def is_whole(server: ScriptedServer) -> bool:
 
 async def fails_with(address: RobotAddress) -> LinkError:
     with pytest.raises(LinkError) as raised:
-        async with open_client(address, timing=QUICK):
+        async with open_client(address, patience=QUICK):
             pass
     return raised.value
 
@@ -229,8 +230,8 @@ async def test_a_server_that_comes_back_later_is_found_again() -> None:
 
 async def test_waits_for_a_robot_that_has_gone_do_not_add_up() -> None:
     server = ScriptedServer({"call_service": echo})
-    timing = replace(QUICK, answer_s=0.5, attempt_s=0.01)
-    async with connected(server, timing=timing) as client:
+    patience = replace(QUICK, answer_s=0.5, attempt_s=0.01)
+    async with connected(server, patience=patience) as client:
         server.hangs_up = True
         await server.drop_all()
         while client.lost_for_s is None:
@@ -261,7 +262,7 @@ async def test_a_hundred_losses_leave_no_socket_behind() -> None:
 
 async def test_a_socket_without_a_sign_of_life_is_replaced() -> None:
     server = ScriptedServer(answers_pings=True)
-    timing = Timing(
+    patience = Patience(
         connect_s=PATIENCE_S,
         ping_s=0.01,
         silence_s=0.05,
@@ -269,7 +270,7 @@ async def test_a_socket_without_a_sign_of_life_is_replaced() -> None:
         linger_s=0.0,
         goodbye_s=0.01,
     )
-    async with connected(server, timing) as client:
+    async with connected(server, patience) as client:
         client.subscribe("/pose")
         await server.until(lambda: server.asked("subscribe"))
         (subscriber,) = (each for each in server.visitors if each.asked("subscribe"))
@@ -335,7 +336,7 @@ async def test_the_last_publication_arrives_before_the_connection_closes() -> No
 async def test_an_error_of_the_user_comes_out_as_it_was_raised() -> None:
     async with running(ScriptedServer()) as server:
         with pytest.raises(LinkError, match="mine"):
-            async with open_client(RobotAddress(url=server.url), timing=QUICK):
+            async with open_client(RobotAddress(url=server.url), patience=QUICK):
                 raise LinkError("mine", hint="")
 
 
@@ -385,7 +386,7 @@ async def test_a_token_goes_into_the_header_or_ahead_of_everything_else() -> Non
             headers={"Authorization": "Bearer secret"},
             token="open sesame",  # noqa: S106 - a fairy tale
         )
-        async with open_client(address, timing=QUICK) as client:
+        async with open_client(address, patience=QUICK) as client:
             await client.call_service("/add")
     for visitor in server.visitors:
         assert visitor.request is not None

@@ -1,5 +1,6 @@
 """Goals of ROS 1 and of robots that only take a pose: told apart by what their topics say."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -9,32 +10,31 @@ import pytest
 from causes import code_of, quote_of
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.messages.fields import Dialect, write_stamp
 from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import STATUS_TOPIC, ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(
+QUICK = Patience(
     first_pause_s=0.001,
     longest_pause_s=0.01,
     linger_s=0.0,
     goodbye_s=1.0,
     frames_s=PATIENCE_S,
 )
-BRIEF = Patience(acceptance_s=0.1, end_s=0.05, return_s=0.1, settling_s=0.0)
-LONG = Patience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
+BRIEF = replace(QUICK, acceptance_s=0.1, end_s=0.05, return_s=0.1, settling_s=0.0)
+LONG = replace(QUICK, acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
 PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 0, 1, 2, 3, 4, 5
 GOAL = Pose(4.0, 2.0)
 
 
 EXECUTING = 2
-connected = partial(connect_scripted, timing=QUICK, patience=LONG)
+connected = partial(connect_scripted, patience=LONG)
 
 
 def published(scripted: ScriptedRobot, topic: str) -> list[Operation]:

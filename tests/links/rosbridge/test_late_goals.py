@@ -1,5 +1,6 @@
 """Goals that navigation takes after we said that they were over: they are ended for certain."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -9,10 +10,11 @@ import pytest
 from causes import code_of
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import CauseCode, GoalState
-from mapspeak.ros.actions import ActionClient, Patience, SentGoal
+from mapspeak.ros.actions import ActionClient
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.messages.fields import Dialect, write_stamp
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import (
     ABORTED,
@@ -28,18 +30,18 @@ from rosbridge_script import PATIENCE_S, Operation, Visitor
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(
+QUICK = Patience(
     first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, frames_s=PATIENCE_S
 )
-BRIEF = Patience(
-    acceptance_s=0.2, listing_s=0.0, end_s=5.0, result_s=0.0, return_s=0.1, settling_s=0.0
+BRIEF = replace(
+    QUICK, acceptance_s=0.2, listing_s=0.0, end_s=5.0, result_s=0.0, return_s=0.1, settling_s=0.0
 )
-LONG = Patience(acceptance_s=PATIENCE_S, end_s=5.0, result_s=0.0, settling_s=0.0)
+LONG = replace(QUICK, acceptance_s=PATIENCE_S, end_s=5.0, result_s=0.0, settling_s=0.0)
 GOAL = Pose(4.0, 2.0)
 OURS, OTHERS, NEWER = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
 EXECUTING = 2
 
-connected = partial(connect_scripted, timing=QUICK, patience=BRIEF)
+connected = partial(connect_scripted, patience=BRIEF)
 
 
 class SlowNav2:
@@ -286,7 +288,7 @@ async def test_a_goal_that_cannot_be_known_by_its_id_is_ended_once_it_is_told_as
         await eventually_so(lambda: NEWER in nav2.cancelled)
 
 
-def goals_of(robot: RosRobot) -> list[SentGoal]:
+def goals_of(robot: RosRobot) -> list[ActionGoal]:
     return client_of(robot).goals
 
 
@@ -349,7 +351,9 @@ async def test_a_move_base_that_fell_silent_and_comes_back_does_not_drive_on() -
     assert stand["linear"]["x"] == stand["angular"]["z"] == 0.0
 
 
-LONG_BUT_WATCHFUL = Patience(acceptance_s=PATIENCE_S, end_s=0.05, return_s=0.2, settling_s=0.0)
+LONG_BUT_WATCHFUL = replace(
+    QUICK, acceptance_s=PATIENCE_S, end_s=0.05, return_s=0.2, settling_s=0.0
+)
 
 
 async def taken_by_move_base(scripted: ScriptedRobot, robot: RosRobot) -> str:

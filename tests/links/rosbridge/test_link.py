@@ -15,13 +15,13 @@ from causes import code_of, quote_of
 from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
+from mapspeak.links.rosbridge import RosbridgeClient, open_rosbridge_robot
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
-from mapspeak.ros.actions import Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings
 from mapspeak.ros.discovery.profile import PoseSource
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.poses import write_pose
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
@@ -39,11 +39,12 @@ from rosbridge_script import PATIENCE_S, Operation, running
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(
+QUICK = Patience(
     first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, frames_s=PATIENCE_S
 )
-BRIEF = Patience(acceptance_s=0.4, end_s=0.05, result_s=0.0, return_s=0.1, settling_s=0.0)
-LONG = Patience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
+BRIEF = replace(QUICK, acceptance_s=0.4, end_s=0.05, result_s=0.0, return_s=0.1, settling_s=0.0)
+LONG = replace(QUICK, acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
+SILENT_AT_ONCE = replace(LONG, pose_silence_s=0.0)
 GOAL = Pose(3.0, 4.0, 1.0)
 OURS, OTHERS = bytes(range(16)), bytes(range(16, 32))
 ROOM = """
@@ -53,7 +54,11 @@ ROOM = """
     """
 
 
-connected = partial(connect_scripted, timing=QUICK, patience=LONG)
+connected = partial(connect_scripted, patience=LONG)
+
+
+def waiting(*first_map_s: float) -> Patience:
+    return replace(LONG, first_map_s=first_map_s)
 
 
 def waits_after(n_silent: int) -> tuple[float, ...]:
@@ -87,8 +92,8 @@ async def test_a_map_that_does_not_come_is_asked_for_again_and_at_last_as_json(
     scripted = ScriptedRobot()
     scripted.latched["/map"] = scripted.map_message(grid_from_text(ROOM))
     scripted.n_silent["/map"] = n_silent
-    async with connected(scripted) as robot:
-        maps = MapSubscriber(robot.connection, robot.profile, waits_s=waits_after(n_silent))
+    async with connected(scripted, patience=waiting(*waits_after(n_silent))) as robot:
+        maps = MapSubscriber(robot.connection, robot.profile)
         assert (await maps.fetch()).n_cols == 4
     encodings = [each["compression"] for each in subscriptions(scripted, "/map")]
     assert encodings == ["cbor", "cbor", "none"][: n_silent + 1]
@@ -96,8 +101,8 @@ async def test_a_map_that_does_not_come_is_asked_for_again_and_at_last_as_json(
 
 async def test_a_map_that_never_comes_is_said_and_may_come_later() -> None:
     scripted = ScriptedRobot()
-    async with connected(scripted) as robot:
-        maps = MapSubscriber(robot.connection, robot.profile, waits_s=(0.01,))
+    async with connected(scripted, patience=waiting(0.01)) as robot:
+        maps = MapSubscriber(robot.connection, robot.profile)
         with pytest.raises(LinkError, match="No map has come on /map yet"):
             await maps.fetch()
         await scripted.publish("/map", scripted.map_message(grid_from_text(ROOM)))
@@ -113,8 +118,8 @@ async def test_a_map_that_never_comes_is_said_and_may_come_later() -> None:
 
 async def test_asking_again_for_a_map_that_takes_long_does_not_begin_it_anew() -> None:
     scripted = ScriptedRobot()
-    async with connected(scripted) as robot:
-        maps = MapSubscriber(robot.connection, robot.profile, waits_s=(0.01, 0.01, 0.01))
+    async with connected(scripted, patience=waiting(0.01, 0.01, 0.01)) as robot:
+        maps = MapSubscriber(robot.connection, robot.profile)
         for _ in range(3):
             with pytest.raises(LinkError, match="ask again"):
                 await maps.fetch()
@@ -216,9 +221,8 @@ async def test_the_pose_is_read_from_the_frames() -> None:
 
 async def test_a_pose_of_frames_that_have_fallen_silent_is_not_told_as_the_present_one() -> None:
     scripted = ScriptedRobot()
-    async with connected(scripted) as robot:
-        await robot.fetch_pose()
-        poses = PoseKeeper(robot.connection, robot.profile, robot._frames, silence_s=0.0)
+    async with connected(scripted, patience=SILENT_AT_ONCE) as robot:
+        poses = PoseKeeper(robot.connection, robot.profile, robot._frames)
         with pytest.raises(LinkError, match="pose is old") as raised:
             _ = poses.latest
     assert "localisation" in raised.value.hint
@@ -233,12 +237,26 @@ async def test_without_frames_the_pose_comes_from_odometry() -> None:
         }
     }
     scripted.topics["/odom"] = "nav_msgs/msg/Odometry"
-    async with connected(scripted, timing=replace(QUICK, frames_s=0.01)) as robot:
+    async with connected(scripted, patience=replace(LONG, frames_s=0.01)) as robot:
         found = await robot.fetch_pose()
         assert found.pose == Pose(1.0, 0.0, 0.0)
         assert found.is_odometry
         assert robot.profile.pose_topic == "/odom"
-        poses = PoseKeeper(robot.connection, robot.profile, robot._frames, silence_s=0.0)
+
+
+async def test_odometry_that_has_fallen_silent_is_not_told_as_the_present_pose() -> None:
+    scripted = ScriptedRobot()
+    scripted.latched = {
+        "/odom": {
+            "header": write_header("odom", 3.0, dialect=Dialect.ROS2),
+            "pose": {"pose": write_pose(Pose(1.0, 0.0))},
+        }
+    }
+    scripted.topics["/odom"] = "nav_msgs/msg/Odometry"
+    patience = replace(SILENT_AT_ONCE, frames_s=0.01)
+    async with connected(scripted, patience=patience) as robot:
+        poses = PoseKeeper(robot.connection, robot.profile, robot._frames)
+        await robot.connection.call_service("/rosapi/get_time")
         with pytest.raises(LinkError, match="no odometry has come"):
             _ = poses.latest
 
@@ -649,7 +667,7 @@ async def test_a_pose_from_odometry_gives_way_to_the_map_once_slam_runs() -> Non
         }
     }
     scripted.topics["/odom"] = "nav_msgs/msg/Odometry"
-    async with connected(scripted, timing=replace(QUICK, frames_s=0.01)) as robot:
+    async with connected(scripted, patience=replace(LONG, frames_s=0.01)) as robot:
         assert robot.profile.pose_topic == "/odom"
         await scripted.publish("/tf", scripted.transforms(Pose(1.0, 2.0)))
 
@@ -693,7 +711,7 @@ async def test_a_robot_that_has_gone_is_not_reported_from_memory() -> None:
         async with (
             running(scripted.server) as server,
             open_rosbridge_robot(
-                server.url, timing=Timing(answer_s=0.5, linger_s=0.0, goodbye_s=0.01)
+                server.url, patience=Patience(answer_s=0.5, linger_s=0.0, goodbye_s=0.01)
             ) as robot,
         ):
             await robot.fetch_pose()
@@ -782,8 +800,8 @@ async def test_a_clock_that_is_told_and_does_not_move_on_is_not_waited_for_witho
     scripted.topics["/clock"] = "rosgraph_msgs/msg/Clock"
     paused = {"clock": {"sec": 50, "nanosec": 0}}
     scripted.latched["/clock"] = paused
-    async with connected(scripted) as robot:
-        clock = RobotClock(robot.connection, standstill_s=0.2)
+    async with connected(scripted, patience=replace(LONG, standstill_s=0.2)) as robot:
+        clock = RobotClock(robot.connection)
         ticks = robot.connection.subscribe("/clock")
 
         async def go_on_telling() -> None:

@@ -13,12 +13,13 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, open_client
+from mapspeak.ros.patience import Patience
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, answering_with, running
 
 pytestmark = pytest.mark.anyio
 
-QUICK = Timing(linger_s=0.0, goodbye_s=1.0)
+QUICK = Patience(linger_s=0.0, goodbye_s=1.0)
 
 
 async def echo(visitor: Visitor, call: Operation) -> None:
@@ -66,7 +67,7 @@ def server_context(certificate: Path) -> ssl.SSLContext:
 
 async def ask(address: RobotAddress) -> dict[str, object]:
     with anyio.fail_after(PATIENCE_S):
-        async with open_client(address, timing=QUICK) as client:
+        async with open_client(address, patience=QUICK) as client:
             return await client.call_service("/add", {"a": 1})
 
 

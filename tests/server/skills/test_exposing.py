@@ -208,7 +208,7 @@ async def test_an_action_is_a_tool_that_is_followed_awaited_and_cancelled(
     robot = SteppedRobot(two_rooms())
     async with (
         open_rosbridge_server(robot, dialect=dialect) as server,
-        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
         watched(robot, client, tmp_path, expose=(f"/{action}",)) as caller,
     ):
         await caller.until(lambda tools: action in tools)

@@ -33,9 +33,9 @@ from mapspeak.links.endpoints import (
     unknown,
 )
 from mapspeak.links.native import SEND_GOAL, NativeLink, NativeRequest
-from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import plain_errors
+from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
@@ -80,10 +80,10 @@ class DdsConnection(NativeLink):
     reads_anew = True
     server_s = 1.0
 
-    def __init__(self, network: DdsNetwork, *, framing_of: FramingOf = framing_by_vendor) -> None:
+    def __init__(self, network: DdsNetwork, *, framing_of: FramingOf, patience: Patience) -> None:
         self.network = network
         self.types = Types()
-        super().__init__(self.types)
+        super().__init__(self.types, patience)
         self._participant = DdsParticipant(network)
         self.discovery = Discovery(
             self._participant.key, on_change=self._note_change, framing_of=framing_of
@@ -350,7 +350,10 @@ class DdsConnection(NativeLink):
 
 @asynccontextmanager
 async def open_dds_connection(
-    network: DdsNetwork, *, framing_of: FramingOf = framing_by_vendor
+    network: DdsNetwork,
+    *,
+    framing_of: FramingOf = framing_by_vendor,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[DdsConnection]:
     """Keep us in a domain while the context lasts; see `DdsConnection`.
 
@@ -359,7 +362,7 @@ async def open_dds_connection(
     """
     with plain_errors():
         async with anyio.create_task_group() as tasks:
-            connection = DdsConnection(network, framing_of=framing_of)
+            connection = DdsConnection(network, framing_of=framing_of, patience=patience)
             try:
                 await connection.start(tasks)
                 yield connection
@@ -383,5 +386,5 @@ async def open_dds_robot(
     Raises:
         LinkError: No robot is found there, or it does not say what it offers.
     """
-    async with open_dds_connection(network) as connection:
-        yield await build_ros_robot(connection, overrides=overrides, patience=patience)
+    async with open_dds_connection(network, patience=patience) as connection:
+        yield await build_ros_robot(connection, overrides=overrides)

@@ -1,6 +1,5 @@
 """What types look like over DDS: described by the robot, or known to us by their hash."""
 
-import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
@@ -10,7 +9,7 @@ from mapspeak.links.cdr import Codec
 from mapspeak.ros.definitions.texts import DISTROS, action_parts, known_definitions, name_parts
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import hash_type
-from mapspeak.ros.messages.fields import Dialect, Message, bare_type
+from mapspeak.ros.messages.fields import TYPE, Dialect, Message, bare_type
 
 _NODES = (
     "string<=256 node_namespace\nstring<=256 node_name\n"
@@ -39,7 +38,6 @@ _PLAIN_TYPES = {
 _STEP, _NESTED = 48, 1
 _LIMITED = (21, 22)
 _ONE, _ARRAY, _BOUNDED, _SEQUENCE = range(4)
-_ROS_NAME = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 
 
 @cache
@@ -75,7 +73,7 @@ def _text_of(fields: Sequence[Mapping[str, Message]]) -> str:
 def _type_of(described: Message) -> str:
     shape, plain = divmod(int(described["type_id"]), _STEP)
     name = str(described["nested_type_name"]) if plain == _NESTED else _PLAIN_TYPES.get(plain)
-    if name is None or (plain == _NESTED and not _ROS_NAME.fullmatch(name)):
+    if name is None or (plain == _NESTED and not TYPE.fullmatch(name)):
         raise LinkError(
             f"The robot describes a field of the kind {described['type_id']}, unknown to us.",
             hint="Take rosbridge, which reads its types on the robot.",

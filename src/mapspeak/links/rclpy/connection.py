@@ -18,6 +18,7 @@ from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wa
 from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
 from mapspeak.ros.link import check_name, plain_errors
 from mapspeak.ros.messages.fields import bare_type
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
@@ -48,9 +49,11 @@ class Ros2Connection(NativeLink):
 
     distro = ""
 
-    def __init__(self, participant: RclpyParticipant, tasks: TaskGroup, *, distro: str) -> None:
+    def __init__(
+        self, participant: RclpyParticipant, tasks: TaskGroup, *, distro: str, patience: Patience
+    ) -> None:
         self._ours = RclpyTypes()
-        super().__init__(self._ours)
+        super().__init__(self._ours, patience)
         self.distro = distro
         self._participant = participant
         self._tasks = tasks
@@ -322,7 +325,7 @@ async def _shows_all_nodes(system: RclpyContext) -> bool:
 
 @asynccontextmanager
 async def open_connection(
-    *, domain_id: int | None = None, distro: str = "", variables: Mapping[str, str]
+    *, domain_id: int | None, distro: str, variables: Mapping[str, str], patience: Patience
 ) -> AsyncGenerator[Ros2Connection]:
     """Keep a node of ours in a domain while the context lasts; see `open_ros2_connection`."""
     with plain_errors():
@@ -331,7 +334,7 @@ async def open_connection(
             _open_participant(domain_id, portal, variables) as participant,
             anyio.create_task_group() as tasks,
         ):
-            connection = Ros2Connection(participant, tasks, distro=distro)
+            connection = Ros2Connection(participant, tasks, distro=distro, patience=patience)
             try:
                 await connection.start()
                 yield connection

@@ -5,8 +5,8 @@ from contextlib import asynccontextmanager
 from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
-from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
@@ -24,6 +24,7 @@ async def open_ros2_connection(
     domain_id: int | None = None,
     distro: str = "",
     variables: Mapping[str, str] = NO_VARIABLES,
+    patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosConnection]:
     """Keep a node of ours in a ROS 2 domain while the context lasts.
 
@@ -42,7 +43,7 @@ async def open_ros2_connection(
         # Without its libraries rclpy fails as if it were not there, and says which one is missing.
         raise ConfigError(f"This Python has no rclpy: {error}.", hint=HINT) from error
     async with open_connection(
-        domain_id=domain_id, distro=distro, variables=variables
+        domain_id=domain_id, distro=distro, variables=variables, patience=patience
     ) as connection:
         yield connection
 
@@ -67,8 +68,8 @@ async def open_ros2_robot(
         LinkError: ROS cannot be started, or no robot is found there.
     """
     async with open_ros2_connection(
-        domain_id=domain_id, distro=distro, variables=variables
+        domain_id=domain_id, distro=distro, variables=variables, patience=patience
     ) as connection:
         if connection.connected_for_s is None:
             await connection.wait_until_connected()
-        yield await build_ros_robot(connection, overrides=overrides, patience=patience)
+        yield await build_ros_robot(connection, overrides=overrides)

@@ -10,7 +10,7 @@ import anyio.lowlevel
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.address import RobotAddress, Timing
+from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.connection import SocketConnection
 from mapspeak.links.rosbridge.protocol.conversation import (
     Encoding,
@@ -20,6 +20,7 @@ from mapspeak.links.rosbridge.protocol.conversation import (
 )
 from mapspeak.links.rosbridge.websocket import open_websocket
 from mapspeak.ros.link import TopicRequest
+from mapspeak.ros.patience import Patience
 
 logger = logging.getLogger(__name__)
 
@@ -42,12 +43,12 @@ class Channel:
         *,
         on_event: Callable[[Event], None],
         on_loss: Callable[["Channel"], None],
-        timing: Timing,
+        patience: Patience,
     ) -> None:
         self._address = address
         self._on_event = on_event
         self._on_loss = on_loss
-        self._timing = timing
+        self._patience = patience
         self._standing: dict[str, bytes] = {}
         self._connection: SocketConnection | None = None
         self._is_up = anyio.Event()
@@ -111,7 +112,7 @@ class Channel:
     async def send_when_up(self, text: bytes) -> None:
         """Send something that must not be lost while the socket is being replaced."""
         with suppress(LinkError):
-            await self.send(text, timeout_s=self._timing.answer_s)
+            await self.send(text, timeout_s=self._patience.answer_s)
 
     async def wait_until_up(self, timeout_s: float) -> None:
         """Return at once, or when there is a connection again."""
@@ -150,7 +151,7 @@ class Channel:
         """Close as the protocol wants it, within the time for that."""
         self._is_closing = True
         if self._connection is not None and self.is_up:
-            with anyio.move_on_after(self._timing.goodbye_s):
+            with anyio.move_on_after(self._patience.goodbye_s):
                 await self._connection.say_goodbye()
 
     async def _keep_up(self, tasks: TaskGroup) -> None:
@@ -193,11 +194,11 @@ class Channel:
                 return
 
     def _pause_after(self, pause_s: float) -> float:
-        return min(max(2 * pause_s, self._timing.first_pause_s), self._timing.longest_pause_s)
+        return min(max(2 * pause_s, self._patience.first_pause_s), self._patience.longest_pause_s)
 
     async def _connect(self, tasks: TaskGroup) -> None:
-        socket = await open_websocket(self._address, timeout_s=self._timing.connect_s)
-        connection = SocketConnection(socket, on_event=self._on_event, timing=self._timing)
+        socket = await open_websocket(self._address, timeout_s=self._patience.connect_s)
+        connection = SocketConnection(socket, on_event=self._on_event, patience=self._patience)
         if self._address.token is not None:
             connection.send(write_operation("auth", token=self._address.token))
         for text in self._standing.values():
@@ -211,7 +212,7 @@ class Channel:
         self._is_up.set()
 
     async def _wait_for_connection(self, timeout_s: float) -> SocketConnection:
-        with anyio.move_on_after(self._patience_s(timeout_s)):
+        with anyio.move_on_after(self._limit_s(timeout_s)):
             while self._connection is None or not self.is_up or self._connection.is_over.is_set():
                 # A connection that has just ended is noticed by `_keep_up` before long.
                 self._wanted.set()
@@ -220,12 +221,12 @@ class Channel:
             return self._connection
         raise self._lost(f"has been lost for {self.lost_for_s or 0.0:.0f} s")
 
-    def _patience_s(self, timeout_s: float) -> float:
+    def _limit_s(self, timeout_s: float) -> float:
         """Return how long to wait: from the loss on, so that waits for a lost robot do not add up.
 
         One that has been away for longer gets the time of one attempt.
         """
-        return min(timeout_s, max(timeout_s - (self.lost_for_s or 0.0), self._timing.attempt_s))
+        return min(timeout_s, max(timeout_s - (self.lost_for_s or 0.0), self._patience.attempt_s))
 
     def _lost(self, what: str) -> LinkError:
         why = f" {self._fault.message}" if self._fault is not None else ""

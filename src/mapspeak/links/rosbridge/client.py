@@ -10,7 +10,7 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.address import RobotAddress, Timing
+from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.channel import Channel, RosbridgeTopicRequest
 from mapspeak.links.rosbridge.protocol.codec import require_cbor
 from mapspeak.links.rosbridge.protocol.conversation import (
@@ -23,11 +23,11 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     write_operation,
 )
 from mapspeak.links.rosbridge.rosapi import Rosapi
-from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.activity import ActionEnd, ActionGoal
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import NOTICE_S, plain_errors
 from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import LinkName, OwnEnds, new_id
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
@@ -35,7 +35,6 @@ logger = logging.getLogger(__name__)
 
 NODE = "rosbridge_websocket"
 """What rosbridge's node is called, whatever its namespace."""
-USUAL_TIMING = Timing()
 ROSAPI = "/rosapi/"
 UNKNOWN = "does not exist"
 """In rosbridge's words; such a call has reached nobody, so it may be made again."""
@@ -50,10 +49,9 @@ class RosbridgeClient(Rosapi):
     none, and what is urgent takes the other; a goal that replaces another frees that one's socket.
     """
 
-    def __init__(self, address: RobotAddress, *, timing: Timing = USUAL_TIMING) -> None:
-        super().__init__()
+    def __init__(self, address: RobotAddress, *, patience: Patience = USUAL_PATIENCE) -> None:
+        super().__init__(patience)
         self.address = address
-        self.timing = timing
         self._control = self._channel()
         self._urgent = self._channel()
         self._goals: dict[str, tuple[ActionGoal, Channel | None]] = {}
@@ -105,8 +103,8 @@ class RosbridgeClient(Rosapi):
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when both sockets are open again."""
-        await self._control.wait_until_up(self.timing.answer_s)
-        await self._urgent.wait_until_up(self.timing.answer_s)
+        await self._control.wait_until_up(self.patience.answer_s)
+        await self._urgent.wait_until_up(self.patience.answer_s)
 
     async def start(self, tasks: TaskGroup) -> None:
         """Connect, and keep connected in the background.
@@ -121,7 +119,7 @@ class RosbridgeClient(Rosapi):
     async def aclose(self) -> None:
         """Close both sockets, once what was published last has had time to arrive."""
         # rosbridge forgets a message when the socket that brought it closes at once.
-        await anyio.sleep_until(self._published_s + self.timing.linger_s)
+        await anyio.sleep_until(self._published_s + self.patience.linger_s)
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._control.say_goodbye)
             tasks.start_soon(self._urgent.say_goodbye)
@@ -141,7 +139,7 @@ class RosbridgeClient(Rosapi):
         text = write_operation("publish", topic=topic, msg=message)
         if self.announcements.use(topic):
             await anyio.sleep(NOTICE_S)
-        await self._free_for_topics().send(text, timeout_s=self.timing.answer_s)
+        await self._free_for_topics().send(text, timeout_s=self.patience.answer_s)
         self._published_s = anyio.current_time()
 
     def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
@@ -166,7 +164,7 @@ class RosbridgeClient(Rosapi):
         rosbridge and rosapi are two nodes: what one of them knows the other may find a moment
         later.
         """
-        left_s = self.timing.answer_s if timeout_s is None else timeout_s
+        left_s = self.patience.answer_s if timeout_s is None else timeout_s
         until_s = anyio.current_time() + left_s
         while True:
             try:
@@ -206,31 +204,31 @@ class RosbridgeClient(Rosapi):
         goal = ActionGoal(goal_id=new_id(), action=action)
         text = write_operation(
             "send_action_goal",
-            id=goal.goal_id,
+            id=goal.id,
             action=action,
             action_type=type_name,
             args=arguments,
             feedback=True,
         )
         channel = self._free_for_topics()
-        self._goals[goal.goal_id] = (goal, channel)
+        self._goals[goal.id] = (goal, channel)
         try:
-            await channel.send(text, timeout_s=self.timing.answer_s)
+            await channel.send(text, timeout_s=self.patience.answer_s)
         except LinkError:
-            del self._goals[goal.goal_id]
+            del self._goals[goal.id]
             raise
         return goal
 
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Cancel a goal over the socket it does not block; its end tells whether that worked."""
-        text = write_operation("cancel_action_goal", id=goal.goal_id, action=goal.action)
+        text = write_operation("cancel_action_goal", id=goal.id, action=goal.action)
         self.start_soon(partial(self._free_for_calls().send_when_up, text))
 
     def give_up_goal(self, goal: ActionGoal) -> None:
         """Replace the socket of a goal without a sign of life, which it may block."""
-        pursued, channel = self._goals.get(goal.goal_id, (None, None))
+        pursued, channel = self._goals.get(goal.id, (None, None))
         if pursued is not None and channel is not None:
-            self._goals[goal.goal_id] = (pursued, None)
+            self._goals[goal.id] = (pursued, None)
             channel.replace()
 
     def clear_the_way(self) -> None:
@@ -250,7 +248,7 @@ class RosbridgeClient(Rosapi):
 
     def _channel(self) -> Channel:
         return Channel(
-            self.address, on_event=self._take, on_loss=self._lose_goals, timing=self.timing
+            self.address, on_event=self._take, on_loss=self._lose_goals, patience=self.patience
         )
 
     def _carries_goal(self, channel: Channel) -> bool:
@@ -319,13 +317,13 @@ class RosbridgeClient(Rosapi):
             if carrier is channel or (carrier is None and not is_alone)
         ]
         for goal in lost:
-            del self._goals[goal.goal_id]
+            del self._goals[goal.id]
             goal.take_loss()
 
 
 @asynccontextmanager
 async def open_client(
-    address: RobotAddress, *, timing: Timing = USUAL_TIMING
+    address: RobotAddress, *, patience: Patience = USUAL_PATIENCE
 ) -> AsyncGenerator[RosbridgeClient]:
     """Keep a robot connected while the context lasts.
 
@@ -334,7 +332,7 @@ async def open_client(
         ConfigError: An old package stands before one that is needed.
     """
     require_cbor()
-    client = RosbridgeClient(address, timing=timing)
+    client = RosbridgeClient(address, patience=patience)
     with plain_errors():
         async with anyio.create_task_group() as tasks:
             await client.start(tasks)
@@ -351,7 +349,6 @@ async def open_rosbridge_robot(
     url: str | RobotAddress,
     *,
     overrides: RobotOverrides = NOTHING_SAID,
-    timing: Timing = USUAL_TIMING,
     patience: Patience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
     """Offer the robot behind a rosbridge server while the context lasts.
@@ -363,7 +360,5 @@ async def open_rosbridge_robot(
         ConfigError: The address is none.
     """
     address = RobotAddress(url=url) if isinstance(url, str) else url
-    async with open_client(address, timing=timing) as client:
-        yield await build_ros_robot(
-            client, overrides=overrides, patience=patience, frames_s=timing.frames_s
-        )
+    async with open_client(address, patience=patience) as client:
+        yield await build_ros_robot(client, overrides=overrides)

@@ -9,7 +9,6 @@ import anyio.lowlevel
 import anyio.to_thread
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.address import Timing
 from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FrameFault
 from mapspeak.links.rosbridge.protocol.conversation import (
     LIGHT_BYTES,
@@ -19,6 +18,7 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     ServiceAnswered,
 )
 from mapspeak.links.rosbridge.websocket import Received, SocketClosed, WebSocket
+from mapspeak.ros.patience import Patience
 
 logger = logging.getLogger(__name__)
 
@@ -49,11 +49,11 @@ class SocketConnection:
     """
 
     def __init__(
-        self, socket: WebSocket, *, on_event: Callable[[Event], None], timing: Timing
+        self, socket: WebSocket, *, on_event: Callable[[Event], None], patience: Patience
     ) -> None:
         self._socket = socket
         self._on_event = on_event
-        self._timing = timing
+        self._patience = patience
         self._conversation = Conversation()
         self._unsent, self._to_send = anyio.create_memory_object_stream[bytes](MAX_UNSENT)
         self._pending: dict[str, Pending] = {}
@@ -196,14 +196,14 @@ class SocketConnection:
 
     async def _listen_for_life(self) -> None:
         n_bytes, heard_s = 0, anyio.current_time()
-        while anyio.current_time() - heard_s < self._timing.silence_s:
-            with anyio.move_on_after(self._timing.ping_s):
+        while anyio.current_time() - heard_s < self._patience.silence_s:
+            with anyio.move_on_after(self._patience.ping_s):
                 await self._socket.ping()
-            await anyio.sleep(self._timing.ping_s)
+            await anyio.sleep(self._patience.ping_s)
             if self._socket.n_bytes_received != n_bytes:
                 n_bytes, heard_s = self._socket.n_bytes_received, anyio.current_time()
 
     async def _wait_for_leave(self) -> None:
         await self.is_over.wait()
-        with anyio.move_on_after(self._timing.retired_s):
+        with anyio.move_on_after(self._patience.retired_s):
             await self._may_go.wait()

@@ -15,6 +15,7 @@ from mapspeak.ros.definitions.texts import (
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.link import RosLink
 from mapspeak.ros.messages.fields import Dialect, bare_type, read_stamp
+from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import NodeLinks, RosGraph
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
@@ -132,8 +133,8 @@ class Rosapi(RosLink[RosbridgeTopicRequest]):
     never called there.
     """
 
-    def __init__(self) -> None:
-        super().__init__(RosbridgeTopicRequest)
+    def __init__(self, patience: Patience) -> None:
+        super().__init__(RosbridgeTopicRequest, patience)
         self._version: tuple[Dialect, str] | None = None
         self._definitions = DefinitionKeeper(self.call_service)
 

@@ -5,14 +5,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 
 import anyio
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.activity import Subscription
+from mapspeak.ros.activity import ActionGoal, ActionState, Subscription
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import RosConnection
 
@@ -36,33 +34,6 @@ LONGEST_LOOK_S = 2.0
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Patience:
-    """How long to wait for what a robot offers, in wall time; a test shortens it.
-
-    Between nodes on Fast DDS, a message that was lost comes again after three seconds: to wait for
-    less would be to take a lost message for a silent robot.
-
-    Attributes:
-        settling_s: After connecting, without anything new, until all that is there is found.
-        acceptance_s: For the first sign that a goal was taken.
-        listing_s: For the list of the goals there are, before our own first one.
-        end_s: For a goal to end that was cancelled or replaced.
-        result_s: For the result of a goal whose end is known already.
-        return_s: After a reconnection, for word of a goal that was under way.
-    """
-
-    settling_s: float = 5.0
-    acceptance_s: float = 5.0
-    listing_s: float = 0.3
-    end_s: float = 4.0
-    result_s: float = 1.0
-    return_s: float = 5.0
-
-
-USUAL_PATIENCE = Patience()
-
-
 class ActionClient(ABC):
     """Sends goals to one action, and knows each of them until the action server has ended it.
 
@@ -81,7 +52,6 @@ class ActionClient(ABC):
         action: str,
         *,
         type_name: str,
-        patience: Patience,
         statuses: Subscription,
     ) -> None:
         self.action = action
@@ -89,9 +59,10 @@ class ActionClient(ABC):
         self.ends_others = False
         self.listeners: list[Callable[[], None]] = []
         self._connection = connection
-        self._patience = patience
+        self._patience = connection.patience
         self._list = statuses
-        self._goals: dict[str, SentGoal] = {}
+        self._goals: dict[str, ActionGoal] = {}
+        self._ways: dict[str, RosConnection] = {}
         self._being_ended: set[str] = set()
         self._statuses: dict[str, ActionState] = {}
         self._feedback_within_s = math.inf
@@ -111,12 +82,12 @@ class ActionClient(ABC):
         return frozenset(goal.owner for goal in self.open_goals if goal.owner is not None)
 
     @property
-    def goals(self) -> list[SentGoal]:
+    def goals(self) -> list[ActionGoal]:
         """Our goals, in the order in which they were sent; of those that are over, the latest."""
         return list(self._goals.values())
 
     @property
-    def open_goals(self) -> list[SentGoal]:
+    def open_goals(self) -> list[ActionGoal]:
         """Our goals that are not over, in the order in which they were sent."""
         return [goal for goal in self.goals if not goal.is_over]
 
@@ -126,7 +97,7 @@ class ActionClient(ABC):
         return self._statuses
 
     @property
-    def ours(self) -> Mapping[str, SentGoal]:
+    def ours(self) -> Mapping[str, ActionGoal]:
         """Our own goals by the server's ids, as far as these are known."""
         return {goal.server_id: goal for goal in self._goals.values() if goal.server_id}
 
@@ -183,7 +154,7 @@ class ActionClient(ABC):
         through: RosConnection,
         owner: str | None = None,
         n_stops: int | None = None,
-    ) -> SentGoal:
+    ) -> ActionGoal:
         """Send a goal; `wait_until_taken` has to follow.
 
         Args:
@@ -202,15 +173,15 @@ class ActionClient(ABC):
         if n_stops != started.n_stops:
             raise GoalError(STOPPED, hint="Send it again when the robot may move.")
         started.n_begun += 1
-        goal = await self._begin(arguments, through, anyio.current_time())
-        goal.owner = owner
+        sent_s = anyio.current_time()
+        goal = await self._begin(arguments, through)
+        goal.owner, goal.sent_s = owner, sent_s
         self._forget_settled()
-        self._goals[goal.id] = goal
         if n_stops != started.n_stops:
             self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
         return goal
 
-    async def wait_until_taken(self, goal: SentGoal) -> None:
+    async def wait_until_taken(self, goal: ActionGoal) -> None:
         """Return when the server has taken or refused a goal; withdraw one that it does not."""
         try:
             is_taken = await goal.wait_until(
@@ -227,7 +198,7 @@ class ActionClient(ABC):
             reason = NOT_TAKEN.format(self._patience.acceptance_s)
             self._withdraw(goal, ActionState.REJECTED, reason)
 
-    async def cancel(self, goal: SentGoal) -> None:
+    async def cancel(self, goal: ActionGoal) -> None:
         """End one goal, and wait a moment for its end.
 
         Raises:
@@ -277,30 +248,35 @@ class ActionClient(ABC):
         return True
 
     @abstractmethod
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
-        """Send a goal."""
+    async def _begin(self, arguments: Message, through: RosConnection) -> ActionGoal:
+        """Send a goal, and keep it with its way."""
+
+    def _keep(self, goal: ActionGoal, through: RosConnection) -> None:
+        goal.type = self.type_name
+        self._goals[goal.id], self._ways[goal.id] = goal, through
 
     @abstractmethod
-    def _ask_to_cancel(self, goal: SentGoal) -> None:
+    def _ask_to_cancel(self, goal: ActionGoal) -> None:
         """Ask at once for the end of a goal, whatever comes of it."""
 
     @abstractmethod
-    async def _cancel(self, goal: SentGoal) -> bool:
+    async def _cancel(self, goal: ActionGoal) -> bool:
         """Ask for the end of a goal; return True when the server says that it has ended."""
 
     @abstractmethod
-    def _look_at(self, goal: SentGoal) -> None:
+    def _look_at(self, goal: ActionGoal) -> None:
         """Take in that time has passed for a goal."""
 
     # --- inside: withdrawing, once for all
 
-    def _withdraw(self, goal: SentGoal, state: ActionState, reason: str) -> None:
+    def _withdraw(self, goal: ActionGoal, state: ActionState, reason: str) -> None:
         """Say that a goal is over, and see to it that the server sees it so."""
-        goal.withdraw(state, reason=reason)
+        goal.is_withdrawn = True
+        goal.finish(state, reason=reason)
         self._ask_to_cancel(goal)
         self._tell()
 
-    def _note_life(self, goal: SentGoal) -> None:
+    def _note_life(self, goal: ActionGoal) -> None:
         """Take in that the server has a goal; one that was withdrawn is cancelled at once."""
         if goal.is_withdrawn and not goal.is_settled and goal.id not in self._being_ended:
             self._being_ended.add(goal.id)
@@ -309,12 +285,12 @@ class ActionClient(ABC):
             logger.warning("A goal of %s that was withdrawn: %s", self.action, goal.afterwards)
             self._connection.start_soon(partial(self._end_for_certain, goal))
 
-    def _note_server_end(self, goal: SentGoal) -> None:
+    def _note_server_end(self, goal: ActionGoal) -> None:
         """Take in that the server has ended a goal that was withdrawn."""
         if goal.is_withdrawn and not goal.is_settled:
             goal.settle()
 
-    async def _end_for_certain(self, goal: SentGoal) -> None:
+    async def _end_for_certain(self, goal: ActionGoal) -> None:
         """Cancel a goal until the server has ended it."""
         for pause_s in PAUSES_S:
             try:
@@ -326,7 +302,7 @@ class ActionClient(ABC):
                 break
         self._being_ended.discard(goal.id)
 
-    async def _cancel_each(self, goals: Iterable[SentGoal]) -> None:
+    async def _cancel_each(self, goals: Iterable[ActionGoal]) -> None:
         """Ask for the end of all goals; raise `LinkError` when one of them was refused."""
         faults: list[LinkError] = []
         for goal in goals:
@@ -337,7 +313,7 @@ class ActionClient(ABC):
         if faults:
             raise faults[0]
 
-    async def _check_ended(self, goals: Iterable[SentGoal]) -> None:
+    async def _check_ended(self, goals: Iterable[ActionGoal]) -> None:
         with anyio.move_on_after(self._patience.end_s):
             for goal in goals:
                 await goal.wait_until_over(within_s=self._patience.end_s)
@@ -351,9 +327,9 @@ class ActionClient(ABC):
 
     def _forget_settled(self) -> None:
         """Forget goals that are over on both sides; of withdrawn ones the latest are kept."""
-        over = [goal for goal in self._goals.values() if goal.is_over]
+        over = [each for each in self.goals if each.is_over and each.id not in self._being_ended]
         for goal in over[: max(len(over) - N_KEPT, 0)]:
-            del self._goals[goal.id]
+            del self._goals[goal.id], self._ways[goal.id]
 
     def _tell(self) -> None:
         for listener in self.listeners:

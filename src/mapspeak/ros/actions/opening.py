@@ -1,6 +1,6 @@
 """The client of an action: one for each connection and action, whoever uses it."""
 
-from mapspeak.ros.actions.client import USUAL_PATIENCE, ActionClient, Patience
+from mapspeak.ros.actions.client import ActionClient
 from mapspeak.ros.actions.ros1 import Ros1ActionClient
 from mapspeak.ros.actions.ros2 import Ros2ActionClient
 from mapspeak.ros.messages.fields import Dialect
@@ -8,14 +8,9 @@ from mapspeak.ros.port import RosConnection
 
 
 def open_action(
-    connection: RosConnection,
-    action: str,
-    *,
-    dialect: Dialect,
-    type_name: str,
-    patience: Patience = USUAL_PATIENCE,
+    connection: RosConnection, action: str, *, dialect: Dialect, type_name: str
 ) -> ActionClient:
-    """Return the client of an action; the first who asks for it decides how patient it is."""
+    """Return the client of an action."""
     known = connection.started.actions.get(action)
     if isinstance(known, ActionClient):
         # A type that somebody got wrong must not stay for ever.
@@ -23,6 +18,6 @@ def open_action(
         if is_right or known.is_busy:
             return known
     kind = Ros2ActionClient if dialect is Dialect.ROS2 else Ros1ActionClient
-    client = kind(connection, action, type_name=type_name, patience=patience)
+    client = kind(connection, action, type_name=type_name)
     connection.started.actions[action] = client
     return client

@@ -5,9 +5,8 @@ from collections.abc import Iterator, Mapping
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.actions.client import GONE, RESULT_LATE, SILENT, ActionClient, Patience
-from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.actions.client import GONE, RESULT_LATE, SILENT, ActionClient
+from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.messages.fields import Dialect, Message, write_header, write_stamp
 from mapspeak.ros.port import RosConnection, has_listeners, new_id
 
@@ -31,9 +30,7 @@ NOW = write_stamp(0.0, dialect=Dialect.ROS1)
 class Ros1ActionClient(ActionClient):
     """Sends goals under ids of ours, by which actionlib's list of goals tells them for certain."""
 
-    def __init__(
-        self, connection: RosConnection, action: str, *, type_name: str, patience: Patience
-    ) -> None:
+    def __init__(self, connection: RosConnection, action: str, *, type_name: str) -> None:
         statuses, results, feedback = (
             connection.subscribe(f"{action}/{topic}", type_name=topic_type)
             for topic, topic_type in (
@@ -42,9 +39,7 @@ class Ros1ActionClient(ActionClient):
                 ("feedback", f"{type_name}ActionFeedback"),
             )
         )
-        super().__init__(
-            connection, action, type_name=type_name, patience=patience, statuses=statuses
-        )
+        super().__init__(connection, action, type_name=type_name, statuses=statuses)
         statuses.listen(self._take_list)
         results.listen(self._take_result)
         feedback.listen(self._take_feedback)
@@ -67,12 +62,11 @@ class Ros1ActionClient(ActionClient):
     async def _is_served(self) -> bool:
         return await has_listeners(self._connection, f"{self.action}/cancel")
 
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
+    async def _begin(self, arguments: Message, through: RosConnection) -> ActionGoal:
         goal_id = new_id()
-        wire = ActionGoal(goal_id=goal_id, action=self.action, ros_id=goal_id)
-        goal = SentGoal(wire, type_name=self.type_name, through=through, sent_s=sent_s)
+        goal = ActionGoal(goal_id=goal_id, action=self.action, ros_id=goal_id)
         # Known before it is sent: the answer may come while it is still being sent.
-        self._goals[goal_id] = goal
+        self._keep(goal, through)
         message = {
             "header": write_header("", 0.0, dialect=Dialect.ROS1),
             "goal_id": {"stamp": NOW, "id": goal_id},
@@ -81,17 +75,17 @@ class Ros1ActionClient(ActionClient):
         try:
             await through.publish(f"{self.action}/goal", message)
         except BaseException:
-            del self._goals[goal_id]
+            del self._goals[goal_id], self._ways[goal_id]
             raise
         return goal
 
-    def _ask_to_cancel(self, goal: SentGoal) -> None:
+    def _ask_to_cancel(self, goal: ActionGoal) -> None:
         # Where nothing is open now, it is asked again as soon as the list shows the goal.
         message = {"stamp": NOW, "id": goal.id}
-        goal.through.publish_everywhere(f"{self.action}/cancel", message)
+        self._ways[goal.id].publish_everywhere(f"{self.action}/cancel", message)
 
-    async def _cancel(self, goal: SentGoal) -> bool:
-        self._publish_cancel(goal.id, goal.through)
+    async def _cancel(self, goal: ActionGoal) -> bool:
+        self._publish_cancel(goal.id, self._ways[goal.id])
         return False
 
     def _publish_cancel(self, goal_id: str, through: RosConnection) -> None:
@@ -103,7 +97,7 @@ class Ros1ActionClient(ActionClient):
                 hint="Stop the robot by hand. The connection is made anew by itself.",
             )
 
-    def _look_at(self, goal: SentGoal) -> None:
+    def _look_at(self, goal: ActionGoal) -> None:
         """Take in that a server has fallen silent; what it lists it says five times a second."""
         if goal.listed_end_s is not None:
             self._end_by_list(goal, self._statuses.get(goal.id, ActionState.LOST), "")
@@ -128,7 +122,7 @@ class Ros1ActionClient(ActionClient):
                 self._take_absence(goal)
         self._tell()
 
-    def _take_state(self, goal: SentGoal, state: ActionState, text: str) -> None:
+    def _take_state(self, goal: ActionGoal, state: ActionState, text: str) -> None:
         if goal.is_over:
             if state.is_final:
                 self._note_server_end(goal)
@@ -139,14 +133,14 @@ class Ros1ActionClient(ActionClient):
         else:
             goal.move_on(state)
 
-    def _take_absence(self, goal: SentGoal) -> None:
+    def _take_absence(self, goal: ActionGoal) -> None:
         """Take in that the server does not list a goal; actionlib does until 5 s after its end."""
         if goal.id in self._being_ended:
             self._note_server_end(goal)
         if goal.state is not ActionState.SENT and not goal.is_over:
             self._withdraw(goal, ActionState.LOST, GONE)
 
-    def _end_by_list(self, goal: SentGoal, state: ActionState, text: str) -> None:
+    def _end_by_list(self, goal: ActionGoal, state: ActionState, text: str) -> None:
         """End a goal by the list, once its result has had time to come."""
         now_s = anyio.current_time()
         goal.reason = goal.reason or text
@@ -154,7 +148,7 @@ class Ros1ActionClient(ActionClient):
         goal.listed_end_s = goal.listed_end_s or now_s
         if now_s - goal.listed_end_s >= self._patience.result_s:
             said = [f"{part.rstrip('.')}." for part in (goal.reason, RESULT_LATE) if part]
-            goal.end(state, reason=" ".join(said))
+            goal.finish(state, reason=" ".join(said))
 
     def _take_result(self, message: Message) -> None:
         for goal_id, state, text in _read_list({"status_list": [message.get("status")]}):
@@ -162,7 +156,7 @@ class Ros1ActionClient(ActionClient):
             if goal is None or not state.is_final:
                 continue
             self._note_server_end(goal)
-            goal.end(state, reason=text, result=result if isinstance(result, Mapping) else None)
+            goal.finish(state, reason=text, result=result if isinstance(result, Mapping) else None)
         self._tell()
 
     def _take_feedback(self, message: Message) -> None:
@@ -171,6 +165,7 @@ class Ros1ActionClient(ActionClient):
             if goal is not None and isinstance(feedback, Mapping):
                 self._note_life(goal)
                 goal.take_feedback(feedback)
+                goal.count_feedback()
         self._tell()
 
 

@@ -7,9 +7,8 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.actions.client import GONE, RESULT_LATE, UNSERVED, ActionClient, Patience
-from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.activity import ActionEnd
+from mapspeak.ros.actions.client import GONE, RESULT_LATE, UNSERVED, ActionClient
+from mapspeak.ros.activity import ActionEnd, ActionGoal, ActionState
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import RosConnection
 
@@ -50,13 +49,9 @@ class Ros2ActionClient(ActionClient):
     certain, and safety comes first: the goal is cancelled, whoever sent it.
     """
 
-    def __init__(
-        self, connection: RosConnection, action: str, *, type_name: str, patience: Patience
-    ) -> None:
+    def __init__(self, connection: RosConnection, action: str, *, type_name: str) -> None:
         statuses = connection.subscribe(f"{action}/_action/status", type_name=STATUS_TYPE)
-        super().__init__(
-            connection, action, type_name=type_name, patience=patience, statuses=statuses
-        )
+        super().__init__(connection, action, type_name=type_name, statuses=statuses)
         self._seen: dict[str, int] = {}
         self._n_seen = 0
         self._suspected: set[str] = set()
@@ -78,37 +73,34 @@ class Ros2ActionClient(ActionClient):
         answer = await self._call_cancel(connection, {})
         return len(answer.get("goals_canceling") or [])
 
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
+    async def _begin(self, arguments: Message, through: RosConnection) -> ActionGoal:
         n_seen = self._n_seen
-        wire = await through.send_goal(self.action, arguments, type_name=self.type_name)
-        goal = SentGoal(
-            wire, type_name=self.type_name, through=through, sent_s=sent_s, n_seen=n_seen
-        )
-        self._goals[goal.id] = goal
-        wire.listen(partial(self._hear, goal))
+        goal = await through.send_goal(self.action, arguments, type_name=self.type_name)
+        goal.n_seen = n_seen
+        self._keep(goal, through)
+        goal.listen(partial(self._hear, goal))
         # The list may have come while the goal was still being sent.
         self._claim(self._seen_since(goal))
         self._hear(goal)
         return goal
 
-    def _ask_to_cancel(self, goal: SentGoal) -> None:
-        goal.through.cancel_goal(goal.wire)
+    def _ask_to_cancel(self, goal: ActionGoal) -> None:
+        self._ways[goal.id].cancel_goal(goal)
         if goal.is_withdrawn:
             goal.n_lists_at_end = self._list.n_received
-            goal.through.give_up_goal(goal.wire)
+            self._ways[goal.id].give_up_goal(goal)
             if goal.server_id is None:
                 # It may be one of those that could not be told apart until now.
                 self._claim(self._seen_since(goal))
 
-    async def _cancel(self, goal: SentGoal) -> bool:
-        wire = goal.wire
-        if wire.ros_id is None:
-            goal.through.cancel_goal(wire)
+    async def _cancel(self, goal: ActionGoal) -> bool:
+        if goal.ros_id is None:
+            self._ways[goal.id].cancel_goal(goal)
         if goal.server_id is None:
             return False
         uuid = list(bytes.fromhex(goal.server_id))
         arguments = {"goal_info": {"goal_id": {"uuid": uuid}}}
-        answer = await self._call_cancel(goal.through, arguments)
+        answer = await self._call_cancel(self._ways[goal.id], arguments)
         if answer.get("return_code", 0) == 0 and answer.get("goals_canceling") == []:
             raise self._refusal(REFUSED)
         return answer.get("return_code", 0) in ENDED
@@ -140,15 +132,15 @@ class Ros2ActionClient(ActionClient):
 
     # --- what is heard
 
-    def _hear(self, goal: SentGoal) -> None:
+    def _hear(self, goal: ActionGoal) -> None:
         """Take in what the connection tells of a goal."""
         goal.heard_s = anyio.current_time()
         self._consider(goal)
         self._tell()
 
-    def _look_at(self, goal: SentGoal) -> None:
+    def _look_at(self, goal: ActionGoal) -> None:
         self._consider(goal)
-        if goal.wire.is_lost:
+        if goal.is_lost:
             # What brought its feedback is gone; the list goes on.
             goal.silent_s = 0.0
         silent_s = anyio.current_time() - goal.heard_s
@@ -157,7 +149,7 @@ class Ros2ActionClient(ActionClient):
             goal.heard_s = anyio.current_time()
             self._connection.start_soon(partial(self._check_served, goal))
 
-    async def _check_served(self, goal: SentGoal) -> None:
+    async def _check_served(self, goal: ActionGoal) -> None:
         """Withdraw a goal whose server is no more: over rosbridge nobody else would tell."""
         try:
             servers = await self._connection.fetch_publishers(f"{self.action}/_action/status")
@@ -182,64 +174,61 @@ class Ros2ActionClient(ActionClient):
             self._consider(goal)
         self._tell()
 
-    def _consider(self, goal: SentGoal) -> None:
+    def _consider(self, goal: ActionGoal) -> None:
         """Draw from all that has been heard how a goal stands."""
-        wire = goal.wire
         status = self._statuses.get(goal.server_id or "")
         if goal.is_withdrawn:
             self._consider_withdrawn(goal, status)
             return
-        if wire.end is not None:
-            self._end_by_result(goal, wire.end)
+        if goal.end is not None:
+            self._end_by_result(goal, goal.end)
             return
-        if wire.feedback is not None and wire.feedback is not goal.taken_feedback:
-            goal.taken_feedback = wire.feedback
-            goal.take_feedback(wire.feedback)
-        if wire.is_accepted:
+        if goal.feedback is not goal.taken_feedback:
+            goal.count_feedback()
+        if goal.is_accepted:
             goal.move_on(ActionState.ACCEPTED)
         if status is not None and not status.is_final:
             goal.move_on(status)
         elif status is not None:
             self._end_by_list(goal, status)
-        if wire.is_lost and not goal.is_over:
+        if goal.is_lost and not goal.is_over:
             self._consider_loss(goal, is_listed=status is not None)
 
-    def _consider_withdrawn(self, goal: SentGoal, status: ActionState | None) -> None:
-        wire = goal.wire
-        is_server_gone = wire.is_lost and wire.ros_id is not None
-        if wire.end is not None or is_server_gone or (status is not None and status.is_final):
+    def _consider_withdrawn(self, goal: ActionGoal, status: ActionState | None) -> None:
+        is_server_gone = goal.is_lost and goal.ros_id is not None
+        if goal.end is not None or is_server_gone or (status is not None and status.is_final):
             self._note_server_end(goal)
             return
         is_listed = status is not None and self._list.n_received > goal.n_lists_at_end
         # That a lost goal was taken once is no sign of life.
-        is_taken = wire.is_accepted and goal.state is not ActionState.LOST
-        if is_taken or is_listed or wire.feedback is not goal.taken_feedback:
+        is_taken = goal.is_accepted and goal.state is not ActionState.LOST
+        if is_taken or is_listed or goal.feedback is not goal.taken_feedback:
             self._note_life(goal)
 
-    def _end_by_result(self, goal: SentGoal, end: ActionEnd) -> None:
+    def _end_by_result(self, goal: ActionGoal, end: ActionEnd) -> None:
         values = end.values if isinstance(end.values, Mapping) else None
         if not end.is_result:
             said = end.values if isinstance(end.values, str) else ""
-            goal.end(ActionState.REJECTED, reason=said or "The action server refused it.")
+            goal.finish(ActionState.REJECTED, reason=said or "The action server refused it.")
             return
         # Without a status of its own the result says nothing; the list of all goals may.
         state = STATES.get(end.status or 0) or self._statuses.get(goal.server_id or "")
         if state is None or not state.is_final:
-            goal.end(ActionState.LOST, reason=UNSAID, result=values)
+            goal.finish(ActionState.LOST, reason=UNSAID, result=values)
         else:
-            goal.end(state, reason=_reason_of(values, state), result=values)
+            goal.finish(state, reason=_reason_of(values, state), result=values)
 
-    def _end_by_list(self, goal: SentGoal, state: ActionState) -> None:
+    def _end_by_list(self, goal: ActionGoal, state: ActionState) -> None:
         now_s = anyio.current_time()
         goal.listed_end_s = goal.listed_end_s or now_s
         goal.move_on(ActionState.ACCEPTED)
         # The result says why; it follows its status at once unless its connection has gone.
-        if goal.wire.is_lost:
-            goal.end(state, reason=RESULT_GONE)
+        if goal.is_lost:
+            goal.finish(state, reason=RESULT_GONE)
         elif now_s - goal.listed_end_s > self._patience.result_s:
-            goal.end(state, reason=RESULT_LATE)
+            goal.finish(state, reason=RESULT_LATE)
 
-    def _consider_loss(self, goal: SentGoal, *, is_listed: bool) -> None:
+    def _consider_loss(self, goal: ActionGoal, *, is_listed: bool) -> None:
         n_lists = self._list.n_received
         if goal.n_lists_at_loss is None:
             goal.n_lists_at_loss = n_lists
@@ -252,7 +241,7 @@ class Ros2ActionClient(ActionClient):
 
     # --- which goal is ours, where only rosbridge knows
 
-    def _seen_since(self, goal: SentGoal) -> list[str]:
+    def _seen_since(self, goal: ActionGoal) -> list[str]:
         """Return the listed goals that go on, and were first seen after a goal was sent."""
         return [
             server_id
@@ -274,11 +263,11 @@ class Ros2ActionClient(ActionClient):
             else:
                 self._give_to_open(server_id)
 
-    def _unresolved(self) -> list[SentGoal]:
+    def _unresolved(self) -> list[ActionGoal]:
         """Return the withdrawn goals that the server may still take under an unknown id."""
         return [goal for goal in self._suspects() if goal.is_withdrawn and not goal.is_settled]
 
-    def _suspects(self) -> list[SentGoal]:
+    def _suspects(self) -> list[ActionGoal]:
         """Return our goals that are over, and that the list may still name for the first time."""
         return [
             goal
@@ -288,7 +277,7 @@ class Ros2ActionClient(ActionClient):
             and (self._is_recent(goal) or (goal.is_withdrawn and not goal.is_settled))
         ]
 
-    def _is_recent(self, goal: SentGoal) -> bool:
+    def _is_recent(self, goal: ActionGoal) -> bool:
         heard_s = max(goal.ended_s or 0.0, goal.heard_s)
         return anyio.current_time() - heard_s < RECENT_S
 
@@ -303,13 +292,13 @@ class Ros2ActionClient(ActionClient):
     def _give_to_ended(self, server_id: str, state: ActionState) -> None:
         """Give an id to a goal that has ended in the same way, or was to be cancelled."""
         for goal in self._suspects():
-            end = goal.wire.end
+            end = goal.end
             told = STATES.get(end.status or 0) if end is not None else ActionState.CANCELLED
             if told is state and (end is not None or goal.is_withdrawn):
                 self._resolve(goal, server_id)
                 return
 
-    def _resolve(self, goal: SentGoal, server_id: str) -> None:
+    def _resolve(self, goal: ActionGoal, server_id: str) -> None:
         """Give an id to a goal that is over; what it may have been is then known to be another."""
         goal.server_id = server_id
         self._note_life(goal)
@@ -322,7 +311,7 @@ class Ros2ActionClient(ActionClient):
         begun_s = anyio.current_time()
         for pause_s in SUSPECTED_S:
             for goal in self._unresolved():
-                goal.through.cancel_goal(goal.wire)
+                self._ways[goal.id].cancel_goal(goal)
             await anyio.sleep(pause_s)
             state = self._statuses.get(server_id, ActionState.CANCELLED)
             is_late = anyio.current_time() - begun_s > UNNAMED_S
@@ -346,7 +335,7 @@ class Ros2ActionClient(ActionClient):
             # It may be the one that is wanted, and that is told as under way.
             return False
         return any(
-            (goal.state is ActionState.CANCELLED or goal.wire.is_lost) and self._is_recent(goal)
+            (goal.state is ActionState.CANCELLED or goal.is_lost) and self._is_recent(goal)
             for goal in self._unresolved()
         )
 

@@ -4,7 +4,7 @@ import base64
 import difflib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,42 +29,33 @@ INDENT = "  "
 
 def describe_type(book: TypeBook, name: str) -> list[str]:
     """Return a line for each field, indented by its depth; a type is spelled out once."""
-    return _Describer(book).lines(book[name], depth=0)
+    return list(_describe(book, book[name], depth=0, told=set()))
+
+
+def _describe(book: TypeBook, message: MessageType, *, depth: int, told: set[str]) -> Iterator[str]:
+    for field in message.fields:
+        head = f"{INDENT * depth}{_say_field(field)}"
+        if not field.is_message:
+            yield head
+        elif not book.knows(field.type):
+            yield f"{head} (not described)"
+        elif _is_short(book[field.type]):
+            yield f"{head} {{{', '.join(map(_say_field, book[field.type].fields))}}}"
+        elif field.type in told or depth > MOST_NESTED:
+            yield f"{head} (as above)"
+        else:
+            told.add(field.type)
+            yield head
+            yield from _describe(book, book[field.type], depth=depth + 1, told=told)
+    if message.constants:
+        shown = [f"{name}={value}" for name, value in message.constants.items()]
+        yield f"{INDENT * depth}# constants: {', '.join(shown[:MOST_CONSTANTS])}"
 
 
 def say_fields(message: MessageType) -> str:
     """Return a type's own fields in a sentence: "Its fields are x: float64, y: float64."."""
     fields = ", ".join(map(_say_field, message.fields))
     return f"Its fields are {fields}." if fields else "It has no fields."
-
-
-class _Describer:
-    def __init__(self, book: TypeBook) -> None:
-        self._book = book
-        self._told: set[str] = set()
-
-    def lines(self, message: MessageType, *, depth: int) -> list[str]:
-        lines: list[str] = []
-        for field in message.fields:
-            lines += self._of_field(field, depth)
-        if message.constants:
-            shown = [f"{name}={value}" for name, value in message.constants.items()]
-            lines.append(f"{INDENT * depth}# constants: {', '.join(shown[:MOST_CONSTANTS])}")
-        return lines
-
-    def _of_field(self, field: Field, depth: int) -> list[str]:
-        head = f"{INDENT * depth}{_say_field(field)}"
-        if not field.is_message:
-            return [head]
-        if not self._book.knows(field.type):
-            return [f"{head} (not described)"]
-        inner = self._book[field.type]
-        if _is_short(inner):
-            return [f"{head} {{{', '.join(map(_say_field, inner.fields))}}}"]
-        if field.type in self._told or depth > MOST_NESTED:
-            return [f"{head} (as above)"]
-        self._told.add(field.type)
-        return [head, *self.lines(inner, depth=depth + 1)]
 
 
 def _say_field(field: Field) -> str:
@@ -94,33 +85,32 @@ def check_message(book: TypeBook, type_name: str, message: object) -> dict[str, 
     Raises:
         LinkError: It does not fit; says the field's path and what its type wants.
     """
-    return _check(book, type_name, message, path="", depth=0)
+    return _check(book, type_name, message, path="")
 
 
-def _check(
-    book: TypeBook, type_name: str, message: object, *, path: str, depth: int
-) -> dict[str, Any]:
+def _check(book: TypeBook, type_name: str, message: object, *, path: str) -> dict[str, Any]:
     if type_name not in TIMES and not book.knows(type_name):
         raise LinkError(
             f"{path or 'The message'} is a {type_name}, which nobody has described.",
             hint="Give its definition first.",
         )
     message_type = book[type_name]
-    if not isinstance(message, Mapping) or depth > MOST_NESTED:
+    if not isinstance(message, Mapping) or path.count(".") > MOST_NESTED:
         raise _misfit(path or "message", f"an object of type {type_name}", message, message_type)
     fields = {field.name: field for field in message_type.fields}
     strangers = [str(name) for name in message if name not in fields]
     if strangers:
         raise _stranger(strangers[0], message_type, path)
     return {
-        name: _check_field(book, fields[name], value, path=_join(path, name), depth=depth)
+        name: check_field(book, fields[name], value, path=_join(path, name))
         for name, value in message.items()
     }
 
 
-def _check_field(book: TypeBook, field: Field, value: object, *, path: str, depth: int) -> Any:  # noqa: ANN401 - ROS JSON
+def check_field(book: TypeBook, field: Field, value: object, *, path: str) -> Any:  # noqa: ANN401 - ROS JSON
+    """Return one field as it may be sent; see `check_message`."""
     if field.length is None:
-        return _check_value(book, field, value, path=path, depth=depth)
+        return _check_value(book, field, value, path=path)
     n_values = _count(field, value)
     if n_values is None:
         or_bytes = ", or bytes in base64" if field.type in BYTES else ""
@@ -131,7 +121,7 @@ def _check_field(book: TypeBook, field: Field, value: object, *, path: str, dept
     if not isinstance(value, list | tuple):
         return value
     return [
-        _check_value(book, field, each, path=f"{path}[{number}]", depth=depth)
+        _check_value(book, field, each, path=f"{path}[{number}]")
         for number, each in enumerate(value)
     ]
 
@@ -153,7 +143,7 @@ def _check_array(book: TypeBook, field: Field, values: NDArray[Any], *, path: st
         raise _misfit(path, f"a list of numbers ({field.shown_type})", f"{values.dtype}")
     # Where one is no number, it is the least and the largest.
     for extreme in (values.min(), values.max()) if values.size else ():
-        _check_value(book, field, extreme, path=path, depth=0)
+        _check_value(book, field, extreme, path=path)
     return values
 
 
@@ -166,7 +156,7 @@ def _check_length(field: Field, length: int, path: str) -> None:
         )
 
 
-def _check_value(book: TypeBook, field: Field, value: object, *, path: str, depth: int) -> Any:  # noqa: ANN401 - ROS JSON
+def _check_value(book: TypeBook, field: Field, value: object, *, path: str) -> Any:  # noqa: ANN401 - ROS JSON
     kind = field.type
     if isinstance(value, np.generic):
         value = value.item()
@@ -184,7 +174,7 @@ def _check_value(book: TypeBook, field: Field, value: object, *, path: str, dept
         return value
     if kind in TEXTS:
         return _check_text(field, value, path)
-    return _check(book, kind, value, path=path, depth=depth + 1)
+    return _check(book, kind, value, path=path)
 
 
 def _check_float(kind: str, value: object, path: str) -> float:

@@ -9,12 +9,11 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.discovery import ranking
+from mapspeak.ros.discovery.choosing import choose_profile, find_namespaces
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.profile import (
     RobotPart,
     RobotProfile,
-    choose_profile,
     find_missing,
     improve,
 )
@@ -159,7 +158,7 @@ async def _choose_alive(
 ) -> RobotProfile:
     """Return the best of what somebody serves, then of what is there by name."""
     liveness = Liveness(connection)
-    trees = ranking.find_namespaces(graph, frozenset())
+    trees = find_namespaces(graph, frozenset())
     for namespace in trees if len(trees) > 1 else ():
         await liveness.ask(f"{namespace}/tf", is_heard=False)
     for _ in range(MOST_ROUNDS):
@@ -187,7 +186,6 @@ async def _fetch_graph(connection: RosConnection, overrides: RobotOverrides) -> 
     return graph if said is None else replace(graph, dialect=said)
 
 
-FRAMES_S = 2.0
 PAUSE_S, LATER_PAUSE_S, LONGEST_PAUSE_S = 0.3, 5.0, 30.0
 """Between two looks: at first, and when all that is there counts as found, ever longer."""
 LONGEST_SETTLING_S = 20.0
@@ -200,9 +198,6 @@ class RobotWatch:
     Nodes of ROS 2 are found one by one: some have been seen after 4.6 s, and Fast DDS repeats what
     was lost on the way after 3 s.
 
-    Args:
-        settling_s: Without anything new, in wall time, after which all that is there is found.
-
     Attributes:
         on_change: Is called with the profile of before when a better one is found.
         is_driving: Tells whether a drive of ours runs, so that the navigation must stay.
@@ -213,13 +208,11 @@ class RobotWatch:
         connection: RosConnection,
         frames: FrameListener,
         overrides: RobotOverrides,
-        *,
-        settling_s: float,
     ) -> None:
         self._connection = connection
         self._frames = frames
         self._overrides = overrides
-        self._settling_s = settling_s
+        self._patience = connection.patience
         self._profile: RobotProfile | None = None
         self._begun_s = self._news_s = anyio.current_time()
         self._names: frozenset[str] = frozenset()
@@ -251,23 +244,23 @@ class RobotWatch:
         now_s = anyio.current_time()
         self._is_settled = (
             self._is_settled
-            or now_s - self._news_s >= self._settling_s
+            or now_s - self._news_s >= self._patience.settling_s
             or now_s - self._begun_s >= LONGEST_SETTLING_S
             or self.is_complete
         )
         return self._is_settled
 
-    async def begin(self, *, frames_s: float) -> None:
+    async def begin(self) -> None:
         """Look for the first time, and wait a moment for frames from the map to the base."""
         while self._profile is None:
             try:
                 await self.look()
             except LinkError:
                 # Right after connecting, whoever would tell may not be found itself.
-                if anyio.current_time() - self._begun_s >= self._settling_s:
+                if anyio.current_time() - self._begun_s >= self._patience.settling_s:
                     raise
                 await anyio.sleep(PAUSE_S)
-        with anyio.move_on_after(frames_s):
+        with anyio.move_on_after(self._patience.frames_s):
             while not self._leads_to_base:
                 await self._wait_for_frames()
                 await self.look()

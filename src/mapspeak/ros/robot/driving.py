@@ -12,7 +12,8 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, StampedPose
-from mapspeak.ros.actions import ActionState, Patience, SentGoal, open_action
+from mapspeak.ros.actions import open_action
+from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.ros.port import RosConnection, has_listeners, new_id
@@ -23,12 +24,14 @@ class GoalRecord:
 
     Attributes:
         goal_id: Ours, used nowhere else.
+        sent: As its action's client knows it; None for one on a topic.
         is_replaced: We have sent another goal since.
     """
 
-    def __init__(self, goal_id: str, goal: Pose) -> None:
-        self.goal_id = goal_id
+    def __init__(self, goal: Pose, *, sent: ActionGoal | None = None) -> None:
+        self.goal_id = new_id() if sent is None else sent.id
         self.goal = goal
+        self.sent = sent
         self.status = GoalStatus(state=GoalState.ACCEPTED)
         self.is_replaced = False
 
@@ -59,17 +62,8 @@ class GoalRecord:
         self.status = replace(self.status, state=state, cause=cause, distance_left_m=left_m)
 
 
-class _Drive(GoalRecord):
-    """A goal as the robot's port tells it, and as the action client knows it."""
-
-    def __init__(self, sent: SentGoal, goal: Pose) -> None:
-        super().__init__(sent.id, goal)
-        self.sent = sent
-
-
 LATEST_S = 0.0
 """A stamp that ROS takes for "as it is now"; our idea of robot time may be off."""
-
 
 STATE_OF = {
     ActionState.SUCCEEDED: GoalState.ARRIVED,
@@ -115,22 +109,17 @@ class ActionDriver:
         navigation: Navigation,
         *,
         map_frame: str,
-        patience: Patience,
         now_s: Callable[[], float],
-        on_lost: Callable[[], None] = lambda: None,
+        on_lost: Callable[[], None],
     ) -> None:
         self._connection = connection
         self._navigation = navigation
         self._map_frame = map_frame
-        self._patience = patience
+        self._patience = connection.patience
         self._on_lost = on_lost
-        self._drives: dict[str, _Drive] = {}
+        self._drives: list[tuple[GoalRecord, ActionGoal]] = []
         self._client = open_action(
-            connection,
-            action,
-            dialect=navigation.dialect,
-            type_name=navigation.type_name,
-            patience=patience,
+            connection, action, dialect=navigation.dialect, type_name=navigation.type_name
         )
         self._client.advertise(connection)
         self._client.ends_others = True
@@ -147,21 +136,20 @@ class ActionDriver:
 
     async def send(self, goal: Pose) -> GoalRecord:
         """Send a goal, and wait until navigation has taken or refused it."""
-        before = [drive for drive in self._drives.values() if not drive.is_over]
+        before = [(record, sent) for record, sent in self._drives if not record.is_over]
         pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
-        goal_fields = self._navigation.write_goal(pose)
-        sent = await self._client.send(goal_fields, through=self._connection)
-        drive = _Drive(sent, goal)
-        self._drives = {each.goal_id: each for each in [*before, drive]}
-        for each in before:
-            each.is_replaced = True
+        sent = await self._client.send(self._navigation.write_goal(pose), through=self._connection)
+        record = GoalRecord(goal, sent=sent)
+        self._drives = [*before, (record, sent)]
+        for replaced, _ in before:
+            replaced.is_replaced = True
         await self._client.wait_until_taken(sent)
-        self._consider(drive)
+        self._consider(record, sent)
         with anyio.move_on_after(self._patience.end_s):
-            for each in before:
-                await each.sent.wait_until_over(within_s=self._patience.end_s)
-                self._consider(each)
-        return drive
+            for replaced, earlier in before:
+                await earlier.wait_until_over(within_s=self._patience.end_s)
+                self._consider(replaced, earlier)
+        return record
 
     async def look_at(self, record: GoalRecord) -> None:
         """Bring a record up to date."""
@@ -170,55 +158,48 @@ class ActionDriver:
 
     async def cancel(self, record: GoalRecord) -> None:
         """End one goal, and wait a moment for its end."""
-        drive = self._drives.get(record.goal_id)
-        if drive is not None and not record.is_over:
-            await self._client.cancel(drive.sent)
-            self._consider(drive)
+        if record.sent is not None and not record.is_over:
+            await self._client.cancel(record.sent)
+            self._consider(record, record.sent)
 
     # --- inside
 
     def _consider_all(self) -> None:
-        for drive in self._drives.values():
-            self._consider(drive)
+        for record, sent in self._drives:
+            self._consider(record, sent)
 
-    def _consider(self, drive: _Drive) -> None:
+    def _consider(self, record: GoalRecord, sent: ActionGoal) -> None:
         """Draw from how the action's goal stands how the drive stands."""
-        sent = drive.sent
-        if drive.status.afterwards != sent.afterwards:
-            drive.status = replace(drive.status, afterwards=sent.afterwards)
-        if drive.is_over:
+        if record.status.afterwards != sent.afterwards:
+            record.status = replace(record.status, afterwards=sent.afterwards)
+        if record.is_over:
             return
         if sent.feedback is not None:
-            left_m, n_recoveries = self._navigation.read_feedback(sent.feedback, drive.goal)
-            drive.drive(distance_left_m=left_m, n_recoveries=n_recoveries)
+            left_m, n_recoveries = self._navigation.read_feedback(sent.feedback, record.goal)
+            record.drive(distance_left_m=left_m, n_recoveries=n_recoveries)
         elif sent.state in (ActionState.RUNNING, ActionState.CANCELLING):
-            drive.drive()
-        if sent.is_over and not self._may_be_replaced_yet(drive):
-            self._end(drive)
+            record.drive()
+        if sent.is_over and not self._may_be_replaced_yet(record, sent):
+            record.end(*self._judge_end(record, sent))
+            if record.status.state is GoalState.LOST:
+                self._on_lost()
 
-    def _may_be_replaced_yet(self, drive: _Drive) -> bool:
+    def _may_be_replaced_yet(self, record: GoalRecord, sent: ActionGoal) -> bool:
         """Return True while the list of all goals, which may name a newer one of others, is behind.
 
         Of a goal that was aborted, the list that says so shows what replaced it; the result comes
         another way, and may come first.
         """
-        sent = drive.sent
-        if drive.is_replaced or sent.state is not ActionState.ABORTED:
+        if record.is_replaced or sent.state is not ActionState.ABORTED:
             return False
         listed = self._client.listed.get(sent.server_id or "")
         is_behind = listed is not None and not listed.is_final
         ended_s = anyio.current_time() - (sent.ended_s or 0.0)
         return is_behind and ended_s < self._patience.result_s
 
-    def _end(self, drive: _Drive) -> None:
-        state, cause = self._judge_end(drive)
-        drive.end(state, cause)
-        if state is GoalState.LOST:
-            self._on_lost()
-
-    def _judge_end(self, drive: _Drive) -> tuple[GoalState, Cause | None]:
+    def _judge_end(self, record: GoalRecord, sent: ActionGoal) -> tuple[GoalState, Cause | None]:
         """Return how a drive ended by what its action's goal and those of others say."""
-        sent, navigation = drive.sent, self._navigation
+        navigation = self._navigation
         state, code = STATE_OF[sent.state], CauseCode.NAVIGATION_SAID
         if state is GoalState.ARRIVED:
             return state, None
@@ -231,7 +212,7 @@ class ActionDriver:
             code = CauseCode.NAVIGATION_LOST
         elif state is GoalState.CANCELLED and REPLACED in sent.reason:
             state = GoalState.PREEMPTED
-        elif state is GoalState.BLOCKED and not drive.is_replaced and self._client.others:
+        elif state is GoalState.BLOCKED and not record.is_replaced and self._client.others:
             return GoalState.PREEMPTED, Cause(code=CauseCode.REPLACED_BY_OTHERS)
         elif state is GoalState.BLOCKED and not sent.reason:
             code = CauseCode.NAVIGATION_MUTE
@@ -344,7 +325,7 @@ class GoalTopicDriver:
 
     async def send(self, goal: Pose) -> GoalRecord:
         """Publish a goal; nobody confirms it."""
-        record = GoalRecord(new_id(), goal)
+        record = GoalRecord(goal)
         self._connection.started.n_begun += 1
         await self._publish(goal)
         if self._current is not None:

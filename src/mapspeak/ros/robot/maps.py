@@ -7,8 +7,8 @@ import anyio.to_thread
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.activity import Subscription
+from mapspeak.ros.discovery.choosing import MAP, MAP_UPDATE
 from mapspeak.ros.discovery.profile import RobotPart, RobotProfile
-from mapspeak.ros.discovery.ranking import MAP, MAP_UPDATE
 from mapspeak.ros.messages.fields import Message, read_stamp
 from mapspeak.ros.messages.grids import apply_grid_update, read_grid
 from mapspeak.ros.port import LinkKind, RosConnection
@@ -21,39 +21,20 @@ MAP_HINT = (
 ROSBRIDGE_HINT = " A map of more than 10 MB needs rosbridge's max_message_size:=200000000."
 
 WAITS_S = (2.0, 4.0)
-"""For the first map, in wall time; between two waits it is asked for anew.
-
-A subscription made before the robot's side knew the publisher never gets the latched map.
-"""
 ROSBRIDGE_WAITS_S = (2.0, 3.0, 10.0)
 """rosbridge writes large maps for many seconds."""
-IN_VAIN_S = 2.0
-"""For a map that nobody publishes, and for one that was waited for in vain before."""
 
 
 class MapSubscriber:
-    """Keeps the latest map, and makes a value of it when somebody wants it.
+    """Keeps the latest map, and makes a value of it when somebody wants it."""
 
-    Args:
-        waits_s: How long to wait for the first map before asking anew, in wall time; None for
-            what is usual over the connection.
-        in_vain_s: How long to wait when all that has passed.
-    """
-
-    def __init__(
-        self,
-        connection: RosConnection,
-        profile: RobotProfile,
-        *,
-        waits_s: tuple[float, ...] | None = None,
-        in_vain_s: float = IN_VAIN_S,
-    ) -> None:
+    def __init__(self, connection: RosConnection, profile: RobotProfile) -> None:
         self._connection = connection
         self._profile = profile
         is_bridged = connection.link.kind is LinkKind.ROSBRIDGE
         usual_s = ROSBRIDGE_WAITS_S if is_bridged else WAITS_S
-        self._waits_s = (waits_s or usual_s) if RobotPart.MAP.is_alive(profile) else ()
-        self._in_vain_s = in_vain_s
+        waits_s = connection.patience.first_map_s or usual_s
+        self._waits_s = waits_s if RobotPart.MAP.is_alive(profile) else ()
         self._hint = MAP_HINT + (ROSBRIDGE_HINT if is_bridged else "")
         self._maps: Subscription | None = None
         self._updates: Subscription | None = None
@@ -120,7 +101,7 @@ class MapSubscriber:
                 raise self._silence(maps)
         if maps.latest is None:
             try:
-                await maps.wait_for_more_than(0, timeout_s=self._in_vain_s)
+                await maps.wait_for_more_than(0, timeout_s=self._connection.patience.later_map_s)
             except LinkError:
                 raise self._silence(maps) from None
 

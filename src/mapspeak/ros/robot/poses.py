@@ -17,8 +17,6 @@ from mapspeak.ros.messages.poses import read_pose_stamped
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.transforms import FrameListener
 
-STANDSTILL_S = 5.0
-"""Of the wall clock; a simulation that slow is paused or has ended."""
 FIRST_TICK_S = 1.0
 """A clock topic that stays silent for so long is left over from something else."""
 ASK_AGAIN_S = 1.0
@@ -29,15 +27,11 @@ EPSILON_S = 1e-6
 
 
 class RobotClock:
-    """Tells robot time, and waits for it.
+    """Tells robot time, and waits for it."""
 
-    Args:
-        standstill_s: Wall time after which a clock that does not move on stands still.
-    """
-
-    def __init__(self, connection: RosConnection, *, standstill_s: float = STANDSTILL_S) -> None:
+    def __init__(self, connection: RosConnection) -> None:
         self._connection = connection
-        self._standstill_s = standstill_s
+        self._standstill_s = connection.patience.standstill_s
         self._offset_s: float | None = None
         self._simulated_s: float | None = None
         self._ticked_s = 0.0
@@ -124,27 +118,15 @@ class RobotClock:
 
 
 PATIENCE_S = 3.0
-SILENCE_S = 10.0
 
 
 class PoseKeeper:
-    """Tells the pose from the tree of frames, or from a topic where the tree does not reach.
-
-    Args:
-        silence_s: Without anything new from a source that speaks all the time, in wall time, after
-            which the pose is too old.
-    """
+    """Tells the pose from the tree of frames, or from a topic where the tree does not reach."""
 
     def __init__(
-        self,
-        connection: RosConnection,
-        profile: RobotProfile,
-        frames: FrameListener,
-        *,
-        silence_s: float = SILENCE_S,
+        self, connection: RosConnection, profile: RobotProfile, frames: FrameListener
     ) -> None:
         self._connection = connection
-        self._silence_s = silence_s
         self._profile = profile
         self._frames = frames
         self._topic: Subscription | None = None
@@ -198,7 +180,7 @@ class PoseKeeper:
         if arrived_s is None:
             return 0.0
         silent_s = max(anyio.current_time() - arrived_s, 0.0)
-        if silent_s > self._silence_s:
+        if silent_s > self._connection.patience.pose_silence_s:
             raise LinkError(
                 f"The robot's pose is old: no {what} has come for {silent_s:.0f} s.",
                 hint="Check that SLAM or localisation and the robot's drivers still run, and that "

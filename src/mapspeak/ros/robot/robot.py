@@ -16,10 +16,9 @@ from mapspeak.robot import (
     RobotDescription,
     StampedPose,
 )
-from mapspeak.ros.actions import USUAL_PATIENCE, Patience
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.profile import NavigationKind, RobotPart, RobotProfile
-from mapspeak.ros.discovery.watch import FRAMES_S, RobotWatch
+from mapspeak.ros.discovery.watch import RobotWatch
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot.driving import (
     MOVE_BASE,
@@ -49,13 +48,11 @@ class RosRobot:
         *,
         frames: FrameListener,
         clock: RobotClock,
-        patience: Patience = USUAL_PATIENCE,
     ) -> None:
         self.connection = connection
         self._watch = watch
         self._frames = frames
         self._clock = clock
-        self._patience = patience
         self._goals: OrderedDict[str, GoalRecord] = OrderedDict()
         self._n_sending = 0
         profile = watch.profile
@@ -236,10 +233,6 @@ class RosRobot:
     def _build_brake(self) -> Brake:
         return Brake(self.connection, self.profile, latest_pose=lambda: self._poses.latest)
 
-    def _stand(self) -> None:
-        """Stop the base itself: whoever drove it has gone, and some keep to the last velocity."""
-        self._brake.pull()
-
     def _build_driver(self) -> ActionDriver | GoalTopicDriver | None:
         profile, name = self.profile, self.profile.navigation_name
         if name is None:
@@ -251,9 +244,9 @@ class RosRobot:
                     name,
                     NAV2 if profile.navigation is NavigationKind.NAV2 else MOVE_BASE,
                     map_frame=profile.map_frame,
-                    patience=self._patience,
                     now_s=lambda: self.now_s,
-                    on_lost=self._stand,
+                    # Some bases keep to the last velocity when whoever drove them has gone.
+                    on_lost=lambda: self._brake.pull(),  # noqa: PLW0108 - of then
                 )
             case NavigationKind.GOAL_TOPIC:
                 return GoalTopicDriver(
@@ -287,24 +280,17 @@ class RosRobot:
 
 
 async def build_ros_robot(
-    connection: RosConnection,
-    *,
-    overrides: RobotOverrides = NOTHING_SAID,
-    patience: Patience = USUAL_PATIENCE,
-    frames_s: float = FRAMES_S,
+    connection: RosConnection, *, overrides: RobotOverrides = NOTHING_SAID
 ) -> RosRobot:
-    """Return the robot at the other end of a connection, once it has said what it offers.
-
-    Its frames are waited for in wall time.
-    """
+    """Return the robot at the other end of a connection, once it has said what it offers."""
     # Whether it is to be driven or only watched, whoever uses it says.
     connection.advertise_late()
     frames = FrameListener(connection)
     clock = RobotClock(connection)
-    watch = RobotWatch(connection, frames, overrides, settling_s=patience.settling_s)
-    await watch.begin(frames_s=frames_s)
+    watch = RobotWatch(connection, frames, overrides)
+    await watch.begin()
     await clock.start(watch.profile.clock_topic)
-    robot = RosRobot(connection, watch, frames=frames, clock=clock, patience=patience)
+    robot = RosRobot(connection, watch, frames=frames, clock=clock)
     connection.start_soon(watch.run)
     connection.start_soon(clock.set_late)
     return robot

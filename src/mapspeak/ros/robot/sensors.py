@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
-from mapspeak.robot import SCAN_PATIENCE_S, RangeScan
+from mapspeak.robot import RangeScan
 from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE, RobotPart, RobotProfile
 from mapspeak.ros.messages.fields import Message
@@ -74,35 +74,22 @@ class IdleSubscriptions:
                 self._is_open = anyio.Event()
 
 
-PATIENCE_S, LONGEST_PATIENCE_S = 5.0, 30.0
-FIRST_PATIENCE_S = 15.0
-"""For a camera that is published and has said nothing yet: some give a picture in ten seconds."""
+LONGEST_PATIENCE_S = 30.0
 TIMES_SLOWEST = 3.0
 INFO_PATIENCE_S = 1.0
 CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
 
 
 class RosCamera:
-    """Takes pictures.
+    """Takes pictures."""
 
-    Args:
-        patience_s: How long to wait for a picture, in wall time; longer for a slow camera.
-        first_patience_s: How long to wait for the first.
-    """
-
-    def __init__(
-        self,
-        connection: RosConnection,
-        profile: RobotProfile,
-        *,
-        patience_s: float = PATIENCE_S,
-        first_patience_s: float = FIRST_PATIENCE_S,
-    ) -> None:
+    def __init__(self, connection: RosConnection, profile: RobotProfile) -> None:
         self._connection = connection
         self._profile = profile
-        self._patience_s = patience_s
+        self._patience_s = connection.patience.picture_s
         is_alive = RobotPart.CAMERA.is_alive(profile)
-        self._next_patience_s = first_patience_s if is_alive else patience_s
+        first_s = connection.patience.first_picture_s
+        self._next_patience_s = first_s if is_alive else self._patience_s
         self._slowest_s = 0.0
         self._idle = IdleSubscriptions(connection, self._subscribe)
 
@@ -213,11 +200,7 @@ STALE_S = 1.0
 
 
 class Laser:
-    """Takes scans. Whatever goes wrong, there is just none: nothing depends on them.
-
-    Args:
-        patience_s: How long to wait for a scan, in wall time.
-    """
+    """Takes scans. Whatever goes wrong, there is just none: nothing depends on them."""
 
     def __init__(
         self,
@@ -226,13 +209,12 @@ class Laser:
         *,
         frames: FrameListener,
         clock: RobotClock,
-        patience_s: float = SCAN_PATIENCE_S,
     ) -> None:
         self._connection = connection
         self._profile = profile
         self._frames = frames
         self._clock = clock
-        self._patience_s = patience_s
+        self._patience_s = connection.patience.scan_s
         self._idle = IdleSubscriptions(connection, self._subscribe)
 
     async def fetch(self, poses: PoseKeeper) -> RangeScan | None:

@@ -35,7 +35,6 @@ class FrameFault(StrEnum):
 
     NO_JSON = "no_json"
     NO_CBOR = "no_cbor"
-    NO_PNG = "no_png"
     NO_FRAGMENT = "no_fragment"
     TOO_LARGE = "too_large"
     TOO_DEEP = "too_deep"

@@ -1,10 +1,8 @@
-"""ROS messages and the bytes of a frame: JSON as rosbridge writes it, CBOR, and PNG."""
+"""ROS messages and the bytes of a frame: JSON as rosbridge writes it, and CBOR."""
 
 import base64
-import io
 import json
 import re
-import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,13 +11,11 @@ import cbor2
 import numpy as np
 import orjson
 from numpy.typing import NDArray
-from PIL import Image
 
 from mapspeak.errors import ConfigError
 from mapspeak.links.rosbridge.protocol.bounds import (
     MAX_CONTAINERS,
     MAX_DEPTH,
-    MAX_FRAME_BYTES,
     MAX_REST_BYTES,
     FrameError,
     FrameFault,
@@ -179,7 +175,6 @@ def _parse(text: bytes, dtype: type[np.int64 | np.float64]) -> Numbers | None:
     return numbers if numbers.size == text.count(b",") + 1 else None
 
 
-MAX_FRAME_PIXELS = MAX_FRAME_BYTES // 3
 MAX_LENIENT_BYTES = 200_000
 """Of a text that only the slower parser reads; long lists of numbers apart."""
 
@@ -250,21 +245,6 @@ def require_cbor() -> None:
             f"The Python package cbor2 in {Path(cbor2.__file__).parent} is too old: {error}.",
             hint="A sourced ROS puts its packages first: start mapspeak with PYTHONPATH unset.",
         ) from error
-
-
-def decode_png(text: str) -> memoryview:
-    """Return the text that rosbridge hid in the pixels of a picture."""
-    try:
-        with Image.open(io.BytesIO(base64.b64decode(text)), formats=["PNG"]) as picture:
-            if picture.width * picture.height > MAX_FRAME_PIXELS:
-                raise FrameError(FrameFault.TOO_LARGE, f"{picture.size} pixels")
-            pixels = (picture if picture.mode == "RGB" else picture.convert("RGB")).tobytes()
-    except (OSError, ValueError, SyntaxError, zlib.error, Image.DecompressionBombError) as error:
-        raise FrameError(FrameFault.NO_PNG, error) from error
-    # The last row is filled up with line ends.
-    n_filled = 3 * picture.width
-    end = len(pixels) - n_filled + len(pixels[-n_filled:].rstrip(b"\n\x00"))
-    return memoryview(pixels)[:end]
 
 
 def _parse_json(text: Raw) -> Any:  # noqa: ANN401 - as above

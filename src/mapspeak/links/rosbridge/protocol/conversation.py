@@ -5,7 +5,7 @@ exception.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -21,15 +21,13 @@ from mapspeak.links.rosbridge.protocol.bounds import (
     FrameFault,
     Raw,
 )
-from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json, decode_png
+from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json
 from mapspeak.ros.messages.fields import NAME, TYPE, Message
 
-MAX_WRAPPINGS = 3
-"""A fragmented png is two layers of wrapping; nothing needs more."""
 MAX_DETAIL_LENGTH = 200
 LIGHT_BYTES = 32_768
 """A frame up to this size is read within a few milliseconds, unless more is wrapped in it."""
-SIGNS_OF_MORE = (b"fragment", b"png", b"\\u")
+SIGNS_OF_MORE = (b"fragment", b"\\u")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -124,8 +122,7 @@ class Conversation:
     def is_light(self, frame: bytes | bytearray) -> bool:
         """Return whether reading a frame is a matter of milliseconds at the worst.
 
-        The last piece of a message completes all of it, and a small picture may hold a large text;
-        an escape may hide that it does.
+        The last piece of a message completes all of it; an escape may hide that it is one.
         """
         return len(frame) <= LIGHT_BYTES and not any(sign in frame for sign in SIGNS_OF_MORE)
 
@@ -133,7 +130,7 @@ class Conversation:
         """Return what a frame says, JSON in UTF-8 or CBOR; None while the message is incomplete."""
         try:
             decode = decode_json if is_text else decode_cbor
-            return self._understand(self._checked(frame, decode), n_wrappings=0)
+            return self._understand(self._checked(frame, decode), is_whole=False)
         except FrameError as error:
             return FrameRefused(error.fault, error.detail[:MAX_DETAIL_LENGTH])
 
@@ -142,34 +139,18 @@ class Conversation:
             raise FrameError(FrameFault.TOO_LARGE, f"{len(frame)} > {self._max_bytes} bytes")
         return decode(frame)
 
-    def _understand(self, operation: Any, *, n_wrappings: int) -> Event | None:  # noqa: ANN401
+    def _understand(self, operation: Any, *, is_whole: bool) -> Event | None:  # noqa: ANN401
         if not isinstance(operation, dict):
             raise FrameError(FrameFault.UNKNOWN_OPERATION, type(operation).__name__)
-        match operation.get("op"):
-            case "publish":
-                return _published(operation)
-            case "service_response":
-                return _service_answered(operation)
-            case "action_feedback":
-                return _goal_fed_back(operation)
-            case "action_result":
-                return _goal_ended(operation)
-            case "status":
-                return _status_noted(operation)
-            case "fragment" | "png" if n_wrappings < MAX_WRAPPINGS:
-                return self._unwrap(operation, n_wrappings=n_wrappings + 1)
-            case other:
-                raise FrameError(FrameFault.UNKNOWN_OPERATION, str(other)[:40])
-
-    def _unwrap(self, operation: dict[str, Any], *, n_wrappings: int) -> Event | None:
-        frame: Raw | None
-        if operation["op"] == "fragment":
-            frame = self._fragments.add(operation)
-            if frame is None:
+        name = operation.get("op")
+        if name == "fragment" and not is_whole:
+            whole = self._fragments.add(operation)
+            if whole is None:
                 return None
-        else:
-            frame = decode_png(_text(operation, "data"))
-        return self._understand(self._checked(frame, decode_json), n_wrappings=n_wrappings)
+            return self._understand(self._checked(whole, decode_json), is_whole=True)
+        if not isinstance(name, str) or name not in _READERS:
+            raise FrameError(FrameFault.UNKNOWN_OPERATION, str(name)[:40])
+        return _READERS[name](operation)
 
 
 def _published(operation: dict[str, Any]) -> Published:
@@ -212,6 +193,15 @@ def _status_noted(operation: dict[str, Any]) -> StatusNoted:
     )
 
 
+_READERS: dict[str, Callable[[dict[str, Any]], Event]] = {
+    "publish": _published,
+    "service_response": _service_answered,
+    "action_feedback": _goal_fed_back,
+    "action_result": _goal_ended,
+    "status": _status_noted,
+}
+
+
 def _text(operation: dict[str, Any], key: str) -> str:
     value = operation.get(key)
     if not isinstance(value, str):
@@ -227,7 +217,6 @@ class Encoding(StrEnum):
 
     JSON = "none"
     CBOR = "cbor"
-    PNG = "png"
 
 
 def write_operation(operation: str, **fields: Any) -> bytes:  # noqa: ANN401 - ROS JSON leaves here

@@ -7,7 +7,7 @@ from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.ros.actions import ActionState, SentGoal
+from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.safety import Act
@@ -214,7 +214,7 @@ class ActionTools:
         return "\n".join([*shown, *([show_message(plain)] if plain or not shown else [])])
 
 
-def _say_next_step(goal: SentGoal) -> str:
+def _say_next_step(goal: ActionGoal) -> str:
     if goal.state is ActionState.REJECTED and goal.is_withdrawn:
         return UNANSWERED
     return NEXT_STEP[goal.state] if goal.state in NEXT_STEP else lead(GOES_ON)

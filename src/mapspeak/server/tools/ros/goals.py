@@ -6,14 +6,8 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import GoalError
-from mapspeak.ros.actions import (
-    USUAL_PATIENCE,
-    ActionClient,
-    ActionState,
-    Patience,
-    SentGoal,
-    open_action,
-)
+from mapspeak.ros.actions import ActionClient, open_action
+from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.server.text.offered import lead
 from mapspeak.server.tools.ros.commands import Publisher, RosCommands
@@ -35,7 +29,7 @@ class TrackedGoal:
     """
 
     handle: str
-    goal: SentGoal
+    goal: ActionGoal
     action: ActionClient
 
 
@@ -60,19 +54,11 @@ class ActionBook:
     Args:
         inquiry: Asks the robot.
         commands: Tells the robot.
-        patience: All time limits.
     """
 
-    def __init__(
-        self,
-        inquiry: RosInquiry,
-        commands: RosCommands,
-        *,
-        patience: Patience = USUAL_PATIENCE,
-    ) -> None:
+    def __init__(self, inquiry: RosInquiry, commands: RosCommands) -> None:
         self._inquiry = inquiry
         self._commands = commands
-        self._patience = patience
         self._jobs: OrderedDict[str, TrackedGoal] = OrderedDict()
         self._n_sent = 0
 
@@ -155,7 +141,7 @@ class ActionBook:
         await client.wait_for_list()
         n_cancelled = await client.cancel_all(self._inquiry.connection)
         for goal in client.open_goals:
-            await goal.wait_until_over(within_s=self._patience.end_s)
+            await goal.wait_until_over(within_s=self._inquiry.connection.patience.end_s)
         return n_cancelled
 
     async def fetch_listed(self, action: str) -> list[ListedGoal]:
@@ -192,7 +178,6 @@ class ActionBook:
             action,
             dialect=await self._inquiry.fetch_dialect(),
             type_name=type_name,
-            patience=self._patience,
         )
 
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 import anyio
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.actions import ActionState
+from mapspeak.ros.activity import ActionState
 from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.messages.fields import Message
 from mapspeak.safety import Act, Call, Publish, zero_velocity_of
