@@ -19,6 +19,7 @@ CREEP = {"linear": {**ZERO, "x": 0.2}, "angular": ZERO}
 RUSH = {"linear": {**ZERO, "x": 2.0}, "angular": ZERO}
 READING = {
     "link",
+    "patience",
     "is_open",
     "connected_for_s",
     "lost_for_s",
@@ -34,7 +35,7 @@ READING = {
     "advertise_late",
     "advertise_early",
 }
-ENDING = {"cancel_goal", "give_up_goal", "clear_the_way"}
+ENDING = {"cancel_goal", "clear_the_way"}
 
 
 class FakeRos:

@@ -116,9 +116,6 @@ class NativeLink(RosLink[NativeRequest]):
     def clear_the_way(self) -> None:
         """Do nothing: in ROS 2 itself, nothing is held up by what was sent before."""
 
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Do nothing: in ROS 2 itself, a goal holds up nothing."""
-
     # --- what each link does in its own way
 
     @abstractmethod

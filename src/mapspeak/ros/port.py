@@ -195,10 +195,10 @@ class RosConnection(Protocol):
         """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Ask for the end of a goal that the server has taken; its `end` tells if that worked."""
+        """Ask for the end of a goal; its `end` tells if that worked.
 
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Let a goal without a sign of life hold up nothing; what is heard of it is told on."""
+        One that is withdrawn holds up nothing from then on; what is heard of it is told on.
+        """
 
     def clear_the_way(self) -> None:
         """Make sure that what is sent next is not held up by what was sent before: for a stop."""

@@ -232,10 +232,6 @@ class GuardedConnection:
         self._connection.cancel_goal(goal)
         self._guard.note_event("stop", f"cancelled {goal.id}", robot_s=self._now_s())
 
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Let a goal without a sign of life hold up nothing; what is heard of it is told on."""
-        self._connection.give_up_goal(goal)
-
     def clear_the_way(self) -> None:
         """Make sure that what is sent next is not held up by what was sent before."""
         self._connection.clear_the_way()

@@ -594,7 +594,11 @@ async def test_a_stop_gets_past_a_service_that_is_stuck() -> None:
         return {"return_code": 0}
 
     scripted.services[CANCEL_SERVICE] = cancel
-    async with connected(scripted) as robot, anyio.create_task_group() as tasks:
+    patience = replace(LONG, end_s=PATIENCE_S)
+    async with (
+        connected(scripted, patience=patience) as robot,
+        anyio.create_task_group() as tasks,
+    ):
         tasks.start_soon(ask_in_vain, robot)
         await scripted.until(lambda: called(scripted, "/slow"))
         await robot.stop()

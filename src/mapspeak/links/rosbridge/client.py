@@ -223,12 +223,10 @@ class RosbridgeClient(Rosapi):
         """Cancel a goal over the socket it does not block; its end tells whether that worked."""
         text = write_operation("cancel_action_goal", id=goal.id, action=goal.action)
         self.start_soon(partial(self._free_for_calls().send_when_up, text))
-
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Replace the socket of a goal without a sign of life, which it may block."""
-        pursued, channel = self._goals.get(goal.id, (None, None))
-        if pursued is not None and channel is not None:
-            self._goals[goal.id] = (pursued, None)
+        _, channel = self._goals.get(goal.id, (goal, None))
+        if goal.is_withdrawn and channel is not None:
+            # Without a sign of life it may block its socket.
+            self._goals[goal.id] = (goal, None)
             channel.replace()
 
     def clear_the_way(self) -> None:

@@ -27,20 +27,6 @@ MAX_REFUSED = 1_000
 """Frames in a row that could not be understood, after which a new connection is tried."""
 
 
-class Pending:
-    """A call that waits for its answer."""
-
-    def __init__(self) -> None:
-        self.is_over = anyio.Event()
-        self.answer: ServiceAnswered | None = None
-        """None after the end means that none can come any more."""
-
-    def end(self, answer: ServiceAnswered | None) -> None:
-        """Let the caller go on."""
-        self.answer = answer
-        self.is_over.set()
-
-
 class SocketConnection:
     """Serves one socket until it dies or is retired.
 
@@ -56,7 +42,8 @@ class SocketConnection:
         self._patience = patience
         self._conversation = Conversation()
         self._unsent, self._to_send = anyio.create_memory_object_stream[bytes](MAX_UNSENT)
-        self._pending: dict[str, Pending] = {}
+        self._pending: dict[str, anyio.Event] = {}
+        self._answers: dict[str, ServiceAnswered] = {}
         self._may_go = anyio.Event()
         self._is_sent = anyio.Event()
         self.is_over = anyio.Event()
@@ -85,14 +72,15 @@ class SocketConnection:
 
     async def ask(self, text: bytes, *, call_id: str) -> ServiceAnswered | None:
         """Return the answer to a call; None when the socket died first."""
-        pending = self._pending[call_id] = Pending()
+        is_over = self._pending[call_id] = anyio.Event()
         try:
             self.send(text)
-            await pending.is_over.wait()
+            await is_over.wait()
         finally:
             del self._pending[call_id]
+            answer = self._answers.pop(call_id, None)
             self._go_if_retired()
-        return pending.answer
+        return answer
 
     async def serve(self) -> None:
         """Move messages both ways until the socket is closed, silent for too long, or retired."""
@@ -104,8 +92,8 @@ class SocketConnection:
             self.is_over.set()
             self._unsent.close()
             self._to_send.close()
-            for pending in self._pending.values():
-                pending.end(None)
+            for is_over in self._pending.values():
+                is_over.set()
             with anyio.CancelScope(shield=True):
                 await self._socket.aclose()
 
@@ -189,10 +177,10 @@ class SocketConnection:
 
     def _answer(self, answer: ServiceAnswered) -> None:
         self.n_answers += 1
-        pending = self._pending.get(answer.call_id)
         # An answer that comes after its caller has gone is of no use to anybody.
-        if pending is not None:
-            pending.end(answer)
+        if answer.call_id in self._pending:
+            self._answers[answer.call_id] = answer
+            self._pending[answer.call_id].set()
 
     async def _listen_for_life(self) -> None:
         n_bytes, heard_s = 0, anyio.current_time()

@@ -88,7 +88,6 @@ class Ros2ActionClient(ActionClient):
         self._ways[goal.id].cancel_goal(goal)
         if goal.is_withdrawn:
             goal.n_lists_at_end = self._list.n_received
-            self._ways[goal.id].give_up_goal(goal)
             if goal.server_id is None:
                 # It may be one of those that could not be told apart until now.
                 self._claim(self._seen_since(goal))
