@@ -47,11 +47,8 @@ def refused(reason: RefusalReason) -> RefusedFrontier:
     ("told", "words"),
     [
         (frontier(BEST, MOST_PER_METRE), "best, most to see per metre, on the way"),
-        (
-            frontier(MOST_TO_SEE, detour_m=12.3),
-            "most to see, going first costs 12 m more in all",
-        ),
-        (frontier(NEAREST, detour_m=2.4), "nearest, going first costs 2 m more in all"),
+        (frontier(MOST_TO_SEE, detour_m=12.3), "most to see, a detour of 12 m"),
+        (frontier(NEAREST, detour_m=2.4), "nearest, a detour of 2 m"),
         (frontier(detour_m=1.4), "on the way"),
         (frontier(detour_m=None), "little to see per metre"),
         (frontier(ONLY), "the only one"),
@@ -65,7 +62,7 @@ def test_merits_are_short_however_much_there_is_to_say() -> None:
     words = say_merits(frontier(BEST, MOST_PER_METRE, NEAREST, detour_m=1234.0))
     assert len(words) < 60
     assert words.startswith("best")
-    assert words.endswith("1234 m more in all")
+    assert words.endswith("a detour of 1234 m")
 
 
 @pytest.mark.parametrize(
@@ -74,7 +71,7 @@ def test_merits_are_short_however_much_there_is_to_say() -> None:
         (RefusalReason.NO_WAY, "behind a wall: no way over known floor"),
         (RefusalReason.TOO_NARROW, "gap of 0.2 m, the robot needs 0.40 m"),
         (RefusalReason.NOTHING_TO_SEE, "0.12 m2 to see, less than 0.50 m2"),
-        (RefusalReason.LOOKED_ALREADY, "looked already, nothing new came into view"),
+        (RefusalReason.LOOKED_ALREADY, "visited or tried already, nothing new came into view"),
         (RefusalReason.CLOSED_OFF, "behind what is closed: no way while it is"),
     ],
 )
@@ -85,11 +82,11 @@ def test_a_refusal_says_why_with_its_numbers(reason: RefusalReason, words: str) 
 @pytest.mark.parametrize(
     ("verdict", "words"),
     [
-        (FrontierVerdict.SOME_LEFT, "1 frontier to go to; refused are 1 behind walls."),
+        (FrontierVerdict.SOME_LEFT, "1 frontier; not offered: 1 behind walls."),
         (FrontierVerdict.NONE_LEFT, "No frontier is left: all known floor ends at walls."),
         (
             FrontierVerdict.ALL_REFUSED,
-            "No frontier is left to go to; refused are 1 behind walls.",
+            "No frontier is left to go to; not offered: 1 behind walls.",
         ),
         (
             FrontierVerdict.NONE_REACHABLE,
@@ -116,4 +113,4 @@ def test_the_most_frequent_refusal_is_told_first() -> None:
         verdict=FrontierVerdict.ALL_REFUSED,
         n_named=0,
     )
-    assert say_verdict(report).endswith("refused are 2 behind walls, 1 too narrow for the robot.")
+    assert say_verdict(report).endswith("not offered: 2 behind walls, 1 too narrow for the robot.")

@@ -106,4 +106,9 @@ async def _turn_to_new_walls(
     )
     turned = await site.drives.wait(turn.goal_id, wait_s=TURN_S, on_progress=on_progress)
     faced = replace(drive.goal, yaw_rad=pose.yaw_rad)
-    return replace(turned, drive=replace(drive, goal=faced), status=report.status)
+    return replace(
+        turned,
+        drive=replace(drive, goal=faced),
+        status=report.status,
+        elapsed_s=report.elapsed_s + turned.elapsed_s,
+    )

@@ -117,7 +117,7 @@ def read_map_picture(text: str, picture: bytes) -> OccupancyGrid:
 # --- the detector --------------------------------------------------------------------------------
 
 SIGHTING = re.compile(
-    r"^- (?P<label>[^,]+), bearing (?P<bearing>[+-]?[\d.]+) deg, range (?P<range>[\d.]+) m",
+    r"^- (?P<label>[^,]+), (?P<bearing>[+-][\d.]+) deg, (?P<range>[\d.]+) m",
     re.MULTILINE,
 )
 CLEAR_RANGE_M = 6.0

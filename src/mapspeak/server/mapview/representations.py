@@ -14,7 +14,7 @@ from mapspeak.errors import MapError
 from mapspeak.server.mapview.drawing import GREYS, draw_world, say_axes
 from mapspeak.server.text.look import MapView
 from mapspeak.server.text.tables import describe_world
-from mapspeak.server.text.told import Told
+from mapspeak.server.text.told import PICTURE, Told
 from mapspeak.server.text.wording import say_pose, say_warnings
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom, draw_robot_pose
@@ -155,7 +155,11 @@ def show(view: MapView, representation: Representation, told: Told | None = None
 
 def _show_picture_and_tables(view: MapView, told: Told) -> Shown:
     text, picture = describe_world(view, told), draw_world(view)
-    caption = picture.caption if told.is_first else picture.caption.replace(f" {GREYS}", "")
+    caption = picture.caption
+    if not told.is_new(PICTURE, caption, is_exact=True):
+        caption = "Picture: scale as before."
+    elif not told.is_first:
+        caption = caption.replace(f" {GREYS}", "")
     return Shown(text=f"{text}\n\n{caption}", png=picture.png)
 
 

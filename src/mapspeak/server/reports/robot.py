@@ -8,6 +8,7 @@ from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict, say_check
@@ -25,6 +26,8 @@ from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 MOST_NAMED = 12
 MOST_PLACES = 20
 """So many are given in full at once; each has some 800 characters."""
+AT_HEADING_RAD = math.radians(15)
+FRESH_S = 1.0
 AT_GOAL_M = 0.5
 """Navigation ends a drive within its tolerance, usually 0.25 m; farther off is worth a word."""
 
@@ -62,8 +65,7 @@ NEXT_STEP = {
     GoalState.TIMED_OUT: "The robot was told to stop. Check its navigation, then send a new goal.",
     GoalState.LOST: "The robot was told to stop. Check where it is, then send a new goal.",
 }
-AT_GOAL = "The robot stands at the goal."
-AT_THING = f"{AT_GOAL} {{look_at}} tells whether the thing is in view, and where."
+AT_THING = "{look_at} tells whether the thing is in view, and where."
 STOP_OWED = (
     "NOT STOPPED: the robot could not be told yet and may drive on. It is told as soon as it can "
     "be reached; press its own stop button if it must stand now."
@@ -83,31 +85,32 @@ class DriveAnswer(Report):
 
     goal_id: str
     place: str
-    goal: PoseReport
+    goal: PoseReport | None = Field(description="null once the robot stands there")
     state: GoalState = Field(
         description="planned, accepted and driving go on, all others are final"
     )
     robot: PoseReport = Field(description="where it is now, or was seen last")
-    pose_age_s: float
+    pose_age_s: float | None = Field(description="null for a fresh pose")
     pose_uncertain: str = Field(
         description="why the robot may be elsewhere; empty for a fresh pose on the map"
     )
     distance_left_m: float | None = Field(description="by path; straight once it has arrived")
     elapsed_s: float
     reason: str
-    next_step: str
+    next_step: str = Field(description="empty once the robot stands at the goal")
 
     @classmethod
     def of(cls, report: DriveReport, *, foreign_goals: Sequence[GoalState] = ()) -> Self:
         """Make the report of a drive, with the goals of others that drive the robot after it."""
         left_m = _distance_left_m(report)
+        is_fresh = report.pose_age_s < FRESH_S
         return cls(
             goal_id=report.drive.goal_id,
             state=report.status.state,
             place=report.drive.place,
-            goal=PoseReport.of(report.drive.goal),
+            goal=None if _stands_at_goal(report) else PoseReport.of(report.drive.goal),
             robot=PoseReport.of(report.pose),
-            pose_age_s=round(report.pose_age_s, 1),
+            pose_age_s=None if is_fresh else round(report.pose_age_s, 1),
             pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
@@ -120,6 +123,14 @@ def _distance_left_m(report: DriveReport) -> float | None:
     if report.status.state is not GoalState.ARRIVED:
         return report.status.distance_left_m
     return report.pose.point.distance_to(report.drive.goal.point)
+
+
+def _stands_at_goal(report: DriveReport) -> bool:
+    if report.status.state is not GoalState.ARRIVED:
+        return False
+    goal, pose = report.drive.goal, report.pose
+    turned_rad = abs(wrap_angle(pose.yaw_rad - goal.yaw_rad))
+    return pose.point.distance_to(goal.point) <= AT_GOAL_M and turned_rad <= AT_HEADING_RAD
 
 
 def _say_next_step(report: DriveReport) -> str:
@@ -135,7 +146,7 @@ def _say_next_step(report: DriveReport) -> str:
         return "Navigation says that it arrived, but the pose is uncertain: look before going on."
     if off_m > AT_GOAL_M:
         return f"Navigation says that it arrived, but the robot is {off_m:.2f} m from the goal now."
-    return lead(AT_THING) if report.drive.purpose is GoalPurpose.CHECK else AT_GOAL
+    return lead(AT_THING) if report.drive.purpose is GoalPurpose.CHECK else ""
 
 
 class GoalAnswer(Report):

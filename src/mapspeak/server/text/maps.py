@@ -62,7 +62,8 @@ def say_ranks(names: Sequence[str], *, is_of_all: bool, has_unsure: bool, so_far
     among = so_far if is_of_all else " of these"
     match names:
         case []:
-            return "No room is sure yet." if has_unsure else "No rooms among them."
+            nothing = "No room is known yet." if is_of_all else "No room is among these."
+            return "No room is sure yet." if has_unsure else nothing
         case [only]:
             return f"The only {'sure ' if has_unsure else ''}room{among}: {only}."
         case [smallest, largest]:
@@ -94,8 +95,8 @@ MERITS = {
     FrontierMerit.NEAREST: "nearest",
 }
 REFUSED = {
-    RefusalReason.LOOKED_ALREADY: "looked at already",
-    RefusalReason.NOTHING_TO_SEE: "with next to nothing to see",
+    RefusalReason.LOOKED_ALREADY: "visited or tried already",
+    RefusalReason.NOTHING_TO_SEE: "with little to see",
     RefusalReason.NO_WAY: "behind walls",
     RefusalReason.TOO_NARROW: "too narrow for the robot",
 }
@@ -120,7 +121,7 @@ def _say_detour(detour_m: float | None) -> str:
         return "little to see per metre"
     if detour_m < LEAST_DETOUR_M:
         return "on the way"
-    return f"going first costs {detour_m:.0f} m more in all"
+    return f"a detour of {detour_m:.0f} m"
 
 
 def say_refusal(border: RefusedFrontier) -> str:
@@ -134,7 +135,7 @@ def say_refusal(border: RefusedFrontier) -> str:
         case RefusalReason.NOTHING_TO_SEE:
             return f"{border.gain_m2:.2f} m2 to see, less than {border.least_gain_m2:.2f} m2"
         case RefusalReason.LOOKED_ALREADY:
-            return "looked already, nothing new came into view"
+            return "visited or tried already, nothing new came into view"
         case RefusalReason.CLOSED_OFF:
             return "behind what is closed: no way while it is"
 
@@ -150,11 +151,11 @@ def say_verdict(report: FrontierReport) -> str:
             return "No frontier can be reached: no free floor with room for the robot is near it."
         case FrontierVerdict.ALL_REFUSED:
             others = _count_refused(report) or "specks too short to be more than noise"
-            return f"No frontier is left to go to; refused are {others}."
+            return f"No frontier is left to go to; not offered: {others}."
         case FrontierVerdict.SOME_LEFT:
             n_left = len(report.frontiers)
-            others = f"; refused are {_count_refused(report)}" if report.refused else ""
-            return f"{n_left} frontier{'s' if n_left > 1 else ''} to go to{others}."
+            others = f"; not offered: {_count_refused(report)}" if report.refused else ""
+            return f"{n_left} frontier{'s' if n_left > 1 else ''}{others}."
 
 
 def _count_refused(report: FrontierReport) -> str:

@@ -21,7 +21,7 @@ from mapspeak.server.text.maps import (
     say_refusal,
     say_verdict,
 )
-from mapspeak.server.text.told import WAY, Told, tell_rows
+from mapspeak.server.text.told import PICTURE, WAY, Told, tell_rows
 from mapspeak.server.text.wording import (
     build_table,
     join_words,
@@ -43,14 +43,12 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
 MOST_WALKS = 6
-AGAIN = (
-    "Below: only what is new or changed since your last look, and the best frontiers; "
-    "full: true gives all."
-)
+AGAIN = "New or changed since your last look:"
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 MEANINGS = (
-    "Floor counts what stands on it, free does not; path m is the robot's way to where it would "
-    "stand; a corridor's size is its length, bends and branches too, by its width."
+    "Floor counts what stands on it, free does not; + marks what is not all seen yet; path m is "
+    "the robot's way to where it would stand; a corridor's size is its length, bends and branches "
+    "too, by its width."
 )
 
 
@@ -78,24 +76,25 @@ def describe_world(view: MapView, told: Told | None = None) -> str:
 
 
 def list_subjects(world: WorldModel) -> frozenset[str]:
-    """Return the ids of all that a reader may have been told of, frontiers left out."""
+    """Return what a reader may have been told of: ids, frontiers left out, and the picture."""
     regions, doors, places = world.rooms.regions, world.rooms.doors, world.places
-    return frozenset(each.id for part in (regions, doors, places) for each in part)
+    return frozenset([PICTURE, *(each.id for part in (regions, doors, places) for each in part)])
 
 
 def _summary(view: MapView, told: Told) -> str:
     world, look = view.world, view.look
     room_id = world.find_room_id(world.robot.point) or "no room"
     explored = f"{known_area_m2(world):.1f} m2 of free floor, {100 * known_ratio(world):.0f} %"
+    width = f", {2 * world.radius_m:.2f} m wide" if told.is_first else ""
     lines = [
         *say_warnings(world),
-        f"Robot: {say_pose(world.robot)}, in {room_id}, {2 * world.radius_m:.2f} m wide.",
-        f"Explored: {explored} of what is to be expected. {say_verdict(world.frontiers)}",
+        f"Robot: {say_pose(world.robot)}, in {room_id}{width}.",
+        f"Explored: {explored} of what is expected. {say_verdict(world.frontiers)}",
     ]
     if Layer.ROOMS in look.layers:
         shown = look.regions(world)
         lines += [say_sizes(world, shown), *_say_reachable(world, shown)]
-    if Layer.FRONTIERS in look.layers:
+    if Layer.FRONTIERS in look.layers and told.is_first:
         lines += _say_extremes(view)
     if view.unseen is not None:
         lines.append(f"Pictures show {view.unseen.pictured_ratio:.0%} of the walls in sight.")
@@ -146,7 +145,7 @@ def _door_table(view: MapView, told: Told) -> str:
         told,
         "Doors and openings, nearest first",
         ("id", "at x, y", "width m", "joins", WAY),
-        view.doors,
+        [view.doors],
         lambda door: _door_row(view.world, door),
     )
     longest_first = sorted(view.corridors.items, key=lambda region: -region.length_m)
@@ -173,8 +172,8 @@ def _frontier_table(view: MapView, told: Told) -> str:
     part = view.frontiers
     shown = part.items if told.is_first else choose_frontiers(part.items, FRONTIERS_AGAIN)
     table = build_table(
-        "Frontiers to the unknown, best first",
-        ("id", "go to x, y, yaw", "length m", "new m2, about", WAY, "from", "why"),
+        "Frontiers to the unknown, best first" if told.is_first else "Frontiers, best first",
+        ("id", "go to x, y, yaw", "new m2, about", WAY, "in", "why"),
         shown,
         lambda frontier: _frontier_row(view.world, frontier),
         n_all=part.n_all,
@@ -199,7 +198,6 @@ def _frontier_row(world: WorldModel, frontier: Frontier) -> Sequence[str]:
     return (
         frontier.id,
         f"{say_point(pose.point)}, {pose.yaw_deg + 0.0:.0f} deg",
-        f"{frontier.length_m:.1f}",
         f"{frontier.gain_m2:.1f}",
         f"{frontier.distance_m:.1f}",
         world.find_room_id(pose.point) or "-",
@@ -228,7 +226,7 @@ def _place_table(view: MapView, told: Told) -> str:
         told,
         "Places remembered, nearest first",
         ("id", "name", "at x, y, yaw", WAY, "in", "saw (observed, not instructions)"),
-        view.places,
+        [view.places],
         lambda place: _place_row(view.world, place),
     )
 
@@ -252,16 +250,17 @@ BENT_RAD = math.radians(45)
 
 
 def room_tables(view: MapView, told: Told) -> str:
-    """Return a table of rooms and one of corridors."""
+    """Return a table of rooms and one of corridors; to who looks again, one of both."""
 
-    def table(heading: str, part: MapPart[Region]) -> str:
+    def table(heading: str, *parts: MapPart[Region]) -> str:
         return tell_rows(
-            told, heading, COLUMNS, part, lambda region: _region_row(view.world, region)
+            told, heading, COLUMNS, parts, lambda region: _region_row(view.world, region)
         )
 
+    if not told.is_first:
+        return table("Rooms and corridors", view.rooms, view.corridors)
     rooms = table(f"Rooms{_say_open_spaces(view.rooms)}, smallest first", view.rooms)
-    corridors = table("Corridors, smallest first", view.corridors)
-    return "\n\n".join(filter(None, [rooms, corridors]))
+    return f"{rooms}\n\n{table('Corridors, smallest first', view.corridors)}"
 
 
 def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
@@ -281,7 +280,8 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
         if smallest.floor_area_m2 + world.growth_m2.get(smallest.id, 0) > second.floor_area_m2:
             lines.append(f"{smallest.id} may turn out larger than {second.id}.")
     if unsure:
-        lines.append(f"Unsure: {', '.join(_say_size(world, room) for room in unsure)}.")
+        named = ", ".join(_say_size(world, room) for room in unsure)
+        lines.append(f"Maybe parts of others: {named}.")
     return " ".join(lines)
 
 
@@ -321,10 +321,12 @@ def _say_open_spaces(rooms: MapPart[Region]) -> str:
 def _region_row(world: WorldModel, region: Region) -> Sequence[str]:
     standing = find_standing_point(world, region)
     doors = [_say_door(world, region, door) for door in world.rooms.doors_of(region)]
+    doubtful = world.rooms.find_doubtful_door(region)
+    doubt = f" ({say_doubtful_door(region, doubtful)})" if doubtful else ""
     return (
         region.id,
         say_kind(region),
-        f"{region.floor_area_m2:.1f}{_say_doubts(world, region)}",
+        f"{_say_floor(world, region)}{doubt}",
         f"{region.free_area_m2:.1f}",
         f"{region.length_m:.1f} x {region.width_m:.1f}",
         say_point(choose_standing_point(world, region)),
@@ -339,22 +341,13 @@ def _say_door(world: WorldModel, region: Region, door: Door) -> str:
     return f"{door.id}>{other if one == region.id else one}{'' if is_passable else ' (no way)'}"
 
 
-def _say_doubts(world: WorldModel, region: Region) -> str:
-    doubts = list(_list_doubts(world, region))
-    return f" ({'; '.join(doubts)})" if doubts else ""
-
-
-def _list_doubts(world: WorldModel, region: Region) -> Iterator[str]:
-    if region.id in world.growth_m2:
-        yield "not all seen"
-    door = world.rooms.find_doubtful_door(region)
-    if door is not None:
-        yield say_doubtful_door(region, door)
+def _say_floor(world: WorldModel, region: Region) -> str:
+    """Return how much floor a region has, with a mark where not all of it has been seen."""
+    return f"{region.floor_area_m2:.1f}{'+' if region.id in world.growth_m2 else ''}"
 
 
 def _say_size(world: WorldModel, room: Region) -> str:
-    size = ", ".join([f"{room.floor_area_m2:.1f} m2", *_list_doubts(world, room)])
-    return f"{room.id} ({size})"
+    return f"{room.id} ({_say_floor(world, room)} m2)"
 
 
 def _rooms_by_size(regions: Sequence[Region]) -> list[Region]:

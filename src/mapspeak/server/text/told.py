@@ -5,10 +5,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TypeVar
 
 from mapspeak.server.text.look import MapPart
-from mapspeak.server.text.wording import build_table, list_some
+from mapspeak.server.text.wording import build_table
 
 Item = TypeVar("Item")
-MOST_SAME = 12
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?")
 SAME = 0.3
@@ -16,6 +15,8 @@ SAME = 0.3
 SAME_RATIO = 0.05
 WAY = "path m"
 """The column of ways, which change with each drive: only whether there is one is news."""
+PICTURE = "picture"
+"""What is told of it: its scale, and what it shows."""
 
 
 class Told:
@@ -32,15 +33,16 @@ class Told:
         self._before = dict(before or {})
         self._now: dict[str, str] = {}
 
-    def is_new(self, subject: str, text: str) -> bool:
+    def is_new(self, subject: str, text: str, *, is_exact: bool = False) -> bool:
         """Return True for what was not told, or not so.
 
         Args:
             subject: An id, or words that end with one.
             text: What there is to tell of it.
+            is_exact: Numbers that changed a little make it new too.
         """
         known = self._before.get(subject)
-        if known is not None and _is_alike(known, text):
+        if known is not None and (known == text or (not is_exact and _is_alike(known, text))):
             self._now[subject] = known
             return False
         self._now[subject] = text
@@ -79,34 +81,31 @@ def tell_rows(
     told: Told,
     heading: str,
     columns: Sequence[str],
-    part: MapPart[Item],
+    parts: Sequence[MapPart[Item]],
     row: Callable[[Item], Sequence[str]],
 ) -> str:
-    """Return a table; of rows that the reader knows the ids and the ways alone, in one line.
+    """Return a table of what the reader does not know; empty where that is nothing.
 
     Args:
         told: What the reader knows, by the first cell of each row.
         heading: What the table shows.
         columns: Their names, `WAY` among them.
-        part: What is listed.
+        parts: What is listed.
         row: Gives an item's line.
     """
-    way, rows = columns.index(WAY), [tuple(row(item)) for item in part.items]
-    n_left_out = part.n_all - len(rows)
+    way, rows = columns.index(WAY), [tuple(row(item)) for part in parts for item in part.items]
+    n_left_out = sum(part.n_all for part in parts) - len(rows)
     fresh = [cells for cells in rows if told.is_new(cells[0], _without_way(cells, way))]
-    same = [f"{cells[0]} {cells[way]}" for cells in rows if cells not in fresh]
-    table = build_table(
-        heading if told.is_first else f"{heading}: new or changed",
+    if not fresh and not told.is_first:
+        return ""
+    return build_table(
+        heading,
         columns,
         fresh,
         lambda cells: cells,
         n_all=len(fresh) + n_left_out,
-        gap_after=part.gap_after if told.is_first else None,
+        gap_after=parts[0].gap_after if told.is_first else None,
     )
-    lines = [table] if fresh or told.is_first else []
-    if same:
-        lines.append(f"As told, {WAY}: {list_some(same, most=MOST_SAME)}.")
-    return "\n".join(lines)
 
 
 def _without_way(cells: Sequence[str], way: int) -> str:

@@ -105,7 +105,7 @@ def _say_picture(picture_id: str, picture: CameraPicture) -> str:
     fov_rad = picture.horizontal_fov_rad
     width = "" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
     return (
-        f"Picture {picture_id}: front camera, {picture.width_px} x {picture.height_px} px{width}, "
+        f"Picture {picture_id}: {picture.width_px} x {picture.height_px} px{width}, "
         f"taken at {say_pose(picture.pose)}."
     )
 
@@ -113,12 +113,12 @@ def _say_picture(picture_id: str, picture: CameraPicture) -> str:
 def _say_detections(detector: str, detections: tuple[Detection, ...]) -> list[str]:
     if not detections:
         return [f"The robot's {detector} reports nothing."]
-    return [f"The robot's {detector} reports (bearing left positive):"] + [
-        f"- {seen.label}, bearing {math.degrees(seen.bearing_rad):+.0f} deg, "
-        f"{_say_range(seen.range_m)}, confidence {seen.confidence_ratio:.2f}"
+    return [f"The robot's {detector} reports (bearing, left positive; range; confidence):"] + [
+        f"- {seen.label}, {math.degrees(seen.bearing_rad):+.0f} deg, "
+        f"{_say_range(seen.range_m)}, {seen.confidence_ratio:.2f}"
         for seen in detections
     ]
 
 
 def _say_range(range_m: float | None) -> str:
-    return "range unknown" if range_m is None else f"range {range_m:.1f} m"
+    return "range unknown" if range_m is None else f"{range_m:.1f} m"
