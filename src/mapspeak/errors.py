@@ -4,9 +4,9 @@ MapspeakError           everything below; carries what is wrong and what to do n
 |- ConfigError          a flag, a world file or a setting that cannot be used
 |- LinkError            the robot cannot be reached, or does not offer what was asked
 |- MapError             a map, or a map file, that cannot be what it claims
-|- GoalError            a goal that cannot be driven to, or a goal id nobody knows
+|- GoalError            a goal that cannot be driven to, or an unknown goal id
 |- PolicyError          what the policy, a hold or a person does not allow
-|- SkillError           a skill nobody knows, or an argument that it does not take
+|- SkillError           an unknown skill, or an argument that it does not take
 `- SemanticMapError     the semantic map file or a record in it is wrong
 """
 

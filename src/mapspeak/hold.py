@@ -1,4 +1,4 @@
-"""The hold: while its file is there the robot stands, whoever asks and whichever server runs.
+"""The hold: while its file exists the robot stands, for every client and every server.
 
 It is a file because a file is simple, is seen by every server at once, outlives them all, and can
 be made and removed by a person with no program of ours at all.

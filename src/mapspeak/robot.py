@@ -15,9 +15,9 @@ from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 
 OLD_POSE_S = 3.0
-"""A pose that is older is no sure answer to where a robot is: it drives on meanwhile."""
+"""An older pose does not tell where the robot is: it may have driven on."""
 SCAN_PATIENCE_S = 0.5
-"""A scan is evidence on the side: nobody waits longer for one, in wall time."""
+"""The longest wait for a scan, in wall time: it is only additional evidence."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,7 +244,7 @@ class GoalStatus:
     Attributes:
         distance_left_m: Along the planned path; None where the robot does not say.
         n_recoveries: How often it had to try again.
-        cause: Why it ended as it did, or waits; None while it drives and where nobody said.
+        cause: Why it ended as it did, or waits; None while it drives, or if unknown.
         afterwards: What became of it after its end, where navigation took it up after all.
     """
 
@@ -301,7 +301,7 @@ class Robot(Protocol):
         """Return how goals stand that others have sent and that are under way; empty when none."""
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
-        """Ask the navigation to end a drive; the robot comes to a stand."""
+        """Ask the navigation to end a drive; the robot stops."""
 
     async def stop(self) -> None:
         """End every drive and command zero velocity, at once."""

@@ -56,7 +56,7 @@ class Session:
 
     Args:
         robot: The robot itself; tools never see it where there is a guard.
-        lease_s: Without a client for so long, a driving robot is stopped.
+        lease_s: A driving robot without a client is stopped after this time.
         guard: What commands are held to; None in tests.
         find_model: Finds what compares meanings; asked once, when it is needed.
 
@@ -91,7 +91,7 @@ class Session:
                 guard.policy.areas,
                 wall_clock=guard.wall_clock,
                 read_events=self.recall_events,
-                # A clearance that somebody has set is kept to the millimetre.
+                # A configured clearance is kept to the millimetre.
                 leaves_pockets=not guard.policy.clearance_m,
             )
             self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
@@ -123,7 +123,7 @@ class Session:
         self._surveying = anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
-        """Mark a client's call, so that the robot knows somebody is there."""
+        """Mark a client's call: its lease begins anew."""
         return self._lease.call()
 
     async def client_is_gone(self, client: str) -> None:
@@ -248,7 +248,7 @@ class Session:
 
         Meanwhile everything else is answered. What cannot be read now is told who asks for it.
         """
-        # Whoever ends the server does not wait for it.
+        # Ending the server does not wait for it.
         in_thread = partial(anyio.to_thread.run_sync, abandon_on_cancel=True)
         with suppress(MapspeakError):
             await in_thread(lambda: self.recollector.warm(self.memory.read()))

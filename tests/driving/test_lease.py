@@ -39,5 +39,5 @@ async def test_a_lease_is_over_when_the_last_call_is_too_long_ago() -> None:
 
 @pytest.mark.parametrize("duration_s", [0.0, -5.0, math.nan])
 async def test_a_lease_that_never_ends_or_never_begins_is_refused(duration_s: float) -> None:
-    with pytest.raises(ConfigError, match="no lease"):
+    with pytest.raises(ConfigError, match="is not valid"):
         Lease(duration_s)

@@ -46,12 +46,12 @@ def test_a_goal_in_the_open_is_fine_and_says_how_far_it_is() -> None:
 @pytest.mark.parametrize(
     ("goal", "verdict", "says"),
     [
-        (Pose(math.nan, 1.0), GoalVerdict.NOT_FINITE, "no place"),
-        (Pose(1.0, math.inf), GoalVerdict.NOT_FINITE, "no place"),
-        (Pose(1.0, 1.0, math.nan), GoalVerdict.NOT_FINITE, "no place"),
-        (Pose(1e300, 1.0), GoalVerdict.NOT_FINITE, "no place"),
+        (Pose(math.nan, 1.0), GoalVerdict.NOT_FINITE, "not a valid goal"),
+        (Pose(1.0, math.inf), GoalVerdict.NOT_FINITE, "not a valid goal"),
+        (Pose(1.0, 1.0, math.nan), GoalVerdict.NOT_FINITE, "not a valid goal"),
+        (Pose(1e300, 1.0), GoalVerdict.NOT_FINITE, "not a valid goal"),
         (Pose(-3.0, 2.0), GoalVerdict.OFF_MAP, "spans x 0.0 to 8.0, y 0.0 to 4.5"),
-        (Pose(7.0, 3.5), GoalVerdict.UNKNOWN, "nobody has seen"),
+        (Pose(7.0, 3.5), GoalVerdict.UNKNOWN, "unexplored space"),
         (Pose(3.25, 3.75), GoalVerdict.OCCUPIED, "in a wall"),
         (Pose(6.75, 0.75), GoalVerdict.UNREACHABLE, "as wide as the robot, 0.80 m"),
     ],

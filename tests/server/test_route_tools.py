@@ -176,7 +176,7 @@ async def test_new_stops_take_the_place_of_the_route_before(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("request_", "says"),
     [
-        ({}, "no route to go on with"),
+        ({}, "no route to continue"),
         ({"stops": []}, "1 to 20 stops"),
         ({"stops": ["D1", "the moon"]}, "Stop 2: There is no place called"),
     ],

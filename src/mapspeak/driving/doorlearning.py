@@ -22,7 +22,7 @@ AHEAD_M = 1.5
 """A robot that gives up at a door stands so near to it, along its way."""
 SAME_DOOR_M = 0.5
 LEAST_TRY_M = 0.3
-"""A robot that has not come so much nearer to a door has not tried it."""
+"""A robot that has not come this much nearer to a door has not tried it."""
 FIRST_PAUSE = timedelta(minutes=15)
 LONGEST_PAUSE = timedelta(hours=24)
 PAUSE_GROWTH = 4

@@ -1,8 +1,8 @@
 """Drives as jobs: sent, asked about later by their id, waited for, cancelled; one at a time.
 
-A drive's state is the robot's own account of it, fetched when somebody asks; nothing runs in the
-background, so a simulated robot's time stands still between two questions. `watch` asks where
-nobody else does, so that a drive ends also when the robot falls silent, jumps or does not move.
+A drive's state is the robot's own account of it, fetched on request; nothing runs in the
+background, so a simulated robot's time stands still between two questions. `watch` asks when
+no client does, so that a drive also ends when the robot falls silent, jumps or does not move.
 
 A drive that ends otherwise than by arriving, or by the navigation's own word that it was cancelled
 or replaced, is stopped; where the robot cannot be reached, as soon as it can.
@@ -135,7 +135,7 @@ class DriveBook:
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
                 way that must not be replaced.
-            LinkError: The robot cannot be reached, or nobody knows where it is.
+            LinkError: The robot cannot be reached, or its pose is unknown.
             PolicyError: The robot must not drive there.
         """
         async with self._starting:
@@ -198,7 +198,7 @@ class DriveBook:
     ) -> DriveReport:
         """Wait until a drive ends or that much robot time has passed; return how it stands then.
 
-        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+        Cancelling the wait cancels the drive and stops the robot.
         """
         try:
             return await self._wait(goal_id, wait_s, on_progress)
@@ -228,7 +228,7 @@ class DriveBook:
         return report
 
     async def _abandon(self, goal_id: str | None) -> None:
-        """End a drive that nobody waits for any more; one out of reach when it is back."""
+        """End a drive whose caller gave up; if the robot is out of reach, once it is back."""
         drive = self._find(goal_id)
         try:
             await self.cancel(drive.goal_id)

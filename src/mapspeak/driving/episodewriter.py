@@ -17,7 +17,7 @@ class Keeping:
 
     Attributes:
         picture: The name under which its picture was kept; None where none was.
-        fault: Why it was not kept, in words; empty where it was, or nobody wanted it kept.
+        fault: Why it was not kept, in words; empty if it was kept or did not have to be.
     """
 
     picture: str | None = None
@@ -29,7 +29,7 @@ class EpisodeWriter:
 
     Args:
         store: Where they are kept.
-        wall_clock: The operator's; without one nothing is kept, since nobody could say when.
+        wall_clock: The operator's; without one nothing is kept, because records need a date.
     """
 
     def __init__(self, store: EpisodeStore, *, wall_clock: Callable[[], datetime] | None) -> None:
@@ -42,7 +42,7 @@ class EpisodeWriter:
         return self._wall_clock is not None
 
     def close(self) -> None:
-        """Keep nothing from now on: whoever only reads leaves no traces."""
+        """Keep nothing from now on: a client that only reads leaves no records."""
         self._wall_clock = None
 
     def keep(

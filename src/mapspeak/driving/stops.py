@@ -97,7 +97,8 @@ class Lease:
     def __init__(self, duration_s: float) -> None:
         if not duration_s > 0:
             raise ConfigError(
-                f"A lease of {duration_s} s is no lease.", hint="Give a positive number of seconds."
+                f"A lease of {duration_s} s is not valid.",
+                hint="Give a positive number of seconds.",
             )
         self.duration_s = duration_s
         self._n_calls = 0

@@ -35,12 +35,12 @@ class GoalCheck:
 
     Attributes:
         radius_m: The robot's, around its centre.
-        clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and where nobody
-            knows.
+        clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and in the
+            unknown.
         nearest: The nearest pose that would work, by ways from the goal that pass through no wall;
             None for a good goal, and where there is none.
-        bounds: The corners of the map with the least and the greatest x and y; None where the goal
-            is no place on any map.
+        bounds: The corners of the map with the least and the greatest x and y; None if the goal
+            is not a valid position.
         areas: The closed areas in the way: the one that the goal is in or too near to, the one
             that the robot stands in, or those on the shortest way.
         is_robot_inside: The robot itself stands in the closed area.
@@ -79,7 +79,7 @@ def check_goal(
 
     Args:
         distances: From the robot, on that map or on its floor without closed areas.
-        opened: Gives the distances from a point on the map itself, where somebody keeps them; to
+        opened: Gives the distances from a point on the map itself, if they are cached; to
             say which closed area cuts a goal off.
     """
     check = judge_goal(grid, distances, goal, opened=opened)
@@ -157,7 +157,7 @@ def _find_closing(
     """Find the closed area that the robot would be over at a goal, or that it stands in itself.
 
     Returns:
-        The area, None where there is none, and whether it is the robot that stands in it.
+        The area or None, and whether it is the robot that stands in it.
     """
     floor = distances.lattice.grid
     if not isinstance(floor, ClosedFloor):
@@ -175,7 +175,7 @@ def _find_closing(
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
     """Find the reachable cell nearest to the goal by ways that pass through no wall.
 
-    What nobody has seen may be floor, so such ways may lead through it. A goal that is walled in,
+    Unknown cells may be floor, so paths may lead through them. A goal that is walled in,
     such as the inside of a cupboard, gets the nearest cell as the crow flies.
     """
     straight: Pose | None = None
@@ -264,7 +264,7 @@ def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid
 
 
 def say_refusal(name: str, check: GoalCheck) -> str:
-    """Return why a place is no goal, with its name where the sentence does not say it."""
+    """Return why a place cannot be a goal, with its name if the sentence lacks it."""
     sentence = say_check(check)
     return sentence if name in sentence else f"{name}: {sentence}"
 
@@ -275,11 +275,11 @@ def say_check(check: GoalCheck) -> str:
     match check.verdict:
         case GoalVerdict.NOT_FINITE:
             at = f"({check.goal.x:g}, {check.goal.y:g})"
-            said = f"{at} is no place: a goal is two numbers of metres."
+            said = f"{at} is not a valid goal: give x and y in metres."
         case GoalVerdict.OFF_MAP:
             said = f"{at} lies off the map{_say_bounds(check)}."
         case GoalVerdict.UNKNOWN:
-            said = f"nobody has seen yet what is at {at}."
+            said = f"{at} lies in unexplored space."
         case GoalVerdict.OCCUPIED:
             said = f"{at} lies in a wall or an obstacle."
         case GoalVerdict.OK:

@@ -94,7 +94,7 @@ def cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
 
 
 def point_ahead(point: Point, heading_rad: float, away_m: float) -> Point:
-    """Return the point so far from another in a direction."""
+    """Return the point at a distance from another, in a direction."""
     return Pose(point.x, point.y, heading_rad).transform(Point(away_m, 0.0))
 
 
@@ -119,7 +119,7 @@ def arrival_pose(world: WorldModel, point: Point) -> Pose:
     """Return the pose at a point in which the robot ends when it drives there straight on.
 
     It is the direction of the last stretch of the way, as long as the robot: a way over cells may
-    end with a step aside, and nobody wants the robot to turn for that.
+    end with a step aside, and the robot should not turn for that.
     """
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
     path = world.map.find_path_over(world.distances, point) if is_near else None

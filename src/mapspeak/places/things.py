@@ -34,8 +34,8 @@ IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNOREC
 def find_thing(world: WorldModel, words: str) -> Place | None:
     """Find the thing that is called so: "fire extinguisher", "nearest sink", "ladder in R2".
 
-    Only its name counts, never what it means: nobody is driven to a guess. Of those in an order, as
-    in "second-nearest charger", one that is numbered counts too, as "charger 2".
+    Only its name counts, never its meaning: the robot never drives to a guess. In an order, as in
+    "second-nearest charger", numbered ones such as "charger 2" count too.
 
     Raises:
         AmbiguousPlaceError: Several things are called so.

@@ -19,9 +19,9 @@ class Errand:
 
     Attributes:
         what: In words, as in "may the robot explore".
-        n_drives: At most so many.
-        duration_s: Within so much robot time from the first one on.
-        n_commands: At most so many commands that are no drives; each is for itself where it is 0.
+        n_drives: The most drives it covers.
+        duration_s: Robot time that it lasts from the first drive on.
+        n_commands: The most other commands it covers; with 0 each needs an approval of its own.
     """
 
     what: str
@@ -119,7 +119,7 @@ class Errands:
 
 
 VALID_S = 600.0
-"""A word that was given is good for so long, and for one command."""
+"""An approval is valid for this long, and for one command."""
 MOST_WAITING = 50
 
 
@@ -129,7 +129,7 @@ Wanted = Command | Errand
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Wish:
-    """What somebody asked for.
+    """What a client asked for.
 
     Attributes:
         id: What an operator calls it.

@@ -38,7 +38,7 @@ _CALLER: ContextVar[Caller] = ContextVar("caller", default=NOBODY)
 
 
 def current_caller() -> Caller:
-    """Return whose call this is; nobody's where mapspeak acts by itself."""
+    """Return whose call this is; empty when mapspeak acts by itself."""
     return _CALLER.get()
 
 
@@ -53,7 +53,7 @@ def calling(caller: Caller) -> Generator[None]:
 
 
 MOST_CHARACTERS = 2_000
-"""Of one argument that somebody gave; what is longer is cut, and said to be."""
+"""The most characters kept of one argument; a cut is marked."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,9 +69,9 @@ class AuditLine:
         event: "decision", "result", "leg", "ended", "stop", "release", "approval" or "memory".
         client: Who wanted it.
         tool: By which tool.
-        kind: Of command; empty for what is none.
+        kind: Of command; empty for other lines.
         what: In words.
-        verdict: "allowed", "refused" or "needs approval"; empty for what is no decision.
+        verdict: "allowed", "refused" or "needs approval"; empty if nothing was decided.
         said: Why, or with what result.
         details: The command's own values.
     """
@@ -190,7 +190,7 @@ def read_audit(path: Path) -> Iterator[AuditLine]:
     """Read a log, line by line; a last line that was cut off by a crash is left out.
 
     Raises:
-        ConfigError: The file cannot be read, or is no audit log.
+        ConfigError: The file cannot be read, or is not an audit log.
     """
     try:
         # Only a line feed ends a line here; what people publish may hold other signs for it.
@@ -206,7 +206,7 @@ def read_audit(path: Path) -> Iterator[AuditLine]:
             if number == len(lines):
                 return
             raise ConfigError(
-                f"{path}, line {number} is no line of an audit log.",
+                f"{path}, line {number} is not a line of an audit log.",
                 hint="Give the file that was named with --audit.",
             ) from error
 

@@ -1,4 +1,4 @@
-"""What somebody may want of the robot that moves or changes something, as values to judge."""
+"""Commands that move the robot or change something, as values to judge."""
 
 import math
 from collections.abc import Mapping

@@ -45,7 +45,7 @@ class GuardedConnection:
         guard: Decides and notes.
         now_s: Robot time.
         by_hand: Knows where velocities would take the robot; None where nothing is closed.
-        planner: Holds the poses of goals to the map; None where nobody checks them.
+        planner: Checks the poses of goals against the map; None for no check.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class GuardedConnection:
         """Publish at once by every way that is open, and return how many: for a stop.
 
         Raises:
-            PolicyError: It is no stop, and the policy does not allow it.
+            PolicyError: It is not a stop, and the policy does not allow it.
         """
         command = Publish(topic=topic, type=self._types.get(topic, ""), message=message)
         if _is_stop(command):
@@ -289,7 +289,7 @@ class GuardedConnection:
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> Subscription:
-        """Return the subscription to a topic, which is begun where there is none yet."""
+        """Return the subscription to a topic, subscribing first if needed."""
         return self._connection.subscribe(
             topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
         )
@@ -386,7 +386,7 @@ def _is_stop(command: Publish | Call) -> bool:
         return is_cancel and command.service.endswith("/_action/cancel_goal")
     if CANCEL_TYPE.fullmatch(command.type) and command.topic.endswith("/cancel"):
         return True
-    # Only types that hold nothing else: an odometry with a speed of zero is no stop.
+    # Only types that hold nothing else: an odometry message with zero speed is not a stop.
     return _is_velocity(command.type) and is_zero_velocity(command.message)
 
 

@@ -44,7 +44,7 @@ class Refused:
 
     Attributes:
         rule: The rule's key in policy.yaml, or what else is against it.
-        error: What whoever gave the command is told.
+        error: What the sender of the command is told.
     """
 
     rule: str
@@ -200,7 +200,7 @@ def _against_speed(command: Command, policy: Policy) -> Refused | None:
     for part, speed in find_speeds(command.message):
         name, key, unit = limits[part]
         most: float = getattr(policy.speeds, key)
-        # Written so that what is no number is refused too.
+        # Written so that NaN is refused too.
         if not speed <= most:
             return refuse(
                 f"{name} of {speed:g} {unit} is above the limit, {most:g} {unit}.",
@@ -233,7 +233,7 @@ def _length_of(vector: Mapping[str, Any]) -> float:
 
 
 def _number(value: object) -> float:
-    """Return a finite number as it is, and what is none as NaN."""
+    """Return a finite number as it is, and anything else as NaN."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     try:
         return float(value) if is_number else math.nan  # type: ignore[arg-type]

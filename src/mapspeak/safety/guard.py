@@ -218,8 +218,8 @@ class Guard:
         approvals: What waits for a person's word.
         wall_clock: The operator's.
         robot: What the operator calls it; empty leaves that to the robot.
-        address: Where the robot is; empty for one that nobody else can reach.
-        n_stops: How often the robot was stopped, for whatever reason.
+        address: Where the robot is; empty for one that no other process can reach.
+        n_stops: How often the robot was stopped, for any reason.
     """
 
     policy: Policy
@@ -288,7 +288,7 @@ class Guard:
         self._note("leg", permit, robot_s=robot_s, said=said)
 
     def note_event(self, event: str, said: str, *, robot_s: float) -> None:
-        """Note what is no command: a stop, a release. It never fails: stopping goes first."""
+        """Note a stop or a release. It never fails: stopping goes first."""
         try:
             self.audit.write(
                 event,

@@ -21,14 +21,14 @@ BRAKING_MPS2 = 1.0
 KEEP_M = 0.05
 """What a stop leaves between the robot's edge and an area; less than ways and goals leave."""
 WAVER_M = 0.01
-"""By so much the pose of a robot that stands differs from one look to the next."""
+"""The pose of a standing robot differs by at most this between two looks."""
 LEAST_STEP_S = 0.05
 LOST_TRACK_S = 2.0
 """What lies longer ago says nothing about how fast the robot drives now."""
 FASTEST_MPS = 5.0
 """What seems to go faster was not driven: localisation has corrected itself."""
 N_STEPS = 8
-"""At so many places of the way to a stand is looked how near the areas are."""
+"""The number of points on the braking path at which the distance to areas is checked."""
 
 
 class Mover(StrEnum):
@@ -60,7 +60,7 @@ class GoalMonitor:
         self._occupied_since_s: float | None = None
 
     def judge(self, revision: MapRevision, *, now_s: float) -> Cause | None:
-        """Return why the goal is no longer a goal; None while it is one."""
+        """Return why the goal is no longer allowed; None while it is."""
         here = self._goal.point
         # The way to the goal was checked; only what closes or fills up since then matters here.
         near = (area for area in revision.areas if area.distance_to(here) < self._radius_m)

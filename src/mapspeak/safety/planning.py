@@ -173,7 +173,7 @@ SURVEY_EVERY_S = 1.0
 """Robot time between two looks at the map; so late may a closing hour be noticed."""
 MOST_POSES = 200
 NO_FRAME = "?"
-"""Of what no frame could be read for, or that is no place in metres."""
+"""For a pose without a readable frame, or one that is not in metres."""
 
 Message = Mapping[str, Any]
 
@@ -302,7 +302,7 @@ def _read_frame(message: Message, outer: str) -> str:
 
 
 def _read_pose(message: Message, *, is_stamped: bool) -> Pose | None:
-    """Return the pose that a Pose, a Pose2D or a PointStamped holds; not finite if it is no place.
+    """Return the pose of a Pose, a Pose2D or a PointStamped; not finite if it has no position.
 
     A message may leave fields out, which are zero then.
     """

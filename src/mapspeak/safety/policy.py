@@ -192,7 +192,7 @@ class Patterns:
 
 
 class Otherwise(StrEnum):
-    """What becomes of a command that needs a person's word where nobody can be asked."""
+    """What becomes of a command that needs approval when no person can be asked."""
 
     REFUSE = "refuse"
     QUEUE = "queue"

@@ -45,7 +45,7 @@ class GuardedRobot:
     """A `Robot` that drives only where its policy lets it; stopping is always allowed.
 
     Args:
-        robot: The robot itself; nobody else may have it.
+        robot: The robot itself; it must not be shared.
         guard: Decides and notes.
         surveyor: Knows what is closed now.
         repeat_s: Between two looks whether a held robot stands, in wall time.
@@ -140,7 +140,7 @@ class GuardedRobot:
         try:
             robot_goal_id = await self._robot.send_goal(plan.legs[0])
         except BaseException as error:
-            # Whether the robot took the goal is unknown: it must not drive with nobody knowing.
+            # Whether the robot took the goal is unknown: it must not drive unnoticed.
             with anyio.CancelScope(shield=True):
                 self._guard.note_result(permit, _say_error(error), robot_s=self.now_s)
                 await self.stop()
@@ -310,7 +310,7 @@ class GuardedRobot:
             try:
                 await self._stop(str(cause))
             except MapspeakError:
-                # It may still drive: nobody may take the drive for ended, and it is stopped again.
+                # It may still drive: the drive must not count as ended, and it is stopped again.
                 del self._verdicts[drive.goal_id]
                 raise
         self._note_end(drive.goal_id, self._verdicts[drive.goal_id])

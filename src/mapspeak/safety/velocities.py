@@ -18,7 +18,7 @@ from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
 from mapspeak.safety.planning import Planner
 
 LEAST_S = 0.5
-"""A single message is taken to move the robot for so long: drivers wait about that for the next."""
+"""How long a single message moves the robot: about how long drivers wait for the next one."""
 STEP_M = 0.05
 MOST_STEPS = 400
 
@@ -30,7 +30,7 @@ _UNTIL_S: ContextVar[float] = ContextVar("publishing_until", default=-math.inf)
 
 @contextmanager
 def publishing_for(duration_s: float) -> Generator[None]:
-    """Say that what is published in the `with` block is published again for so long."""
+    """Say that what is published in the `with` block is repeated for `duration_s`."""
     token = _UNTIL_S.set(anyio.current_time() + duration_s)
     try:
         yield
@@ -87,7 +87,7 @@ class HandDriving:
     async def find_objection(self, message: Message) -> Refused | None:
         """Return which closed area a velocity would take the robot into; None where into none.
 
-        That nobody knows where the robot is counts as an objection.
+        An unknown pose counts as an objection.
         """
         if not self._surveyor.has_rules or not _is_moving(message):
             return None
@@ -159,7 +159,7 @@ def zero_velocity_of(message: Message) -> dict[str, Any]:
 def is_zero_velocity(message: Message) -> bool:
     """Return True when a velocity says that the robot stands, with every field at zero.
 
-    A speed of zero beside an acceleration or a steering angle is none.
+    A speed of zero with an acceleration or a steering angle does not count.
     """
     return any(True for _ in find_speeds(message)) and _is_zero(message)
 
@@ -191,7 +191,7 @@ def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
 def _is_moving(message: Message) -> bool:
     """Return True for a message with speeds.
 
-    One that is no number is refused for that elsewhere.
+    NaN is refused elsewhere.
     """
     speeds = [speed for _, speed in find_speeds(message)]
     return any(speeds) and all(map(math.isfinite, speeds))

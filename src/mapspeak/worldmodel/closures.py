@@ -176,7 +176,7 @@ def mask_areas(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> Mask:
 
 
 _FAR_CELLS = 30_000
-"""OpenCV draws with 16 bits before the point; no map has so many rows or columns."""
+"""OpenCV draws with 16 bits before the point; no map has that many rows or columns."""
 
 
 SILL_M = 0.3

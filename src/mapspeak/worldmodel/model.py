@@ -112,10 +112,10 @@ class WorldModel:
     Args:
         looked_from: Places of former frontiers that the robot has been to.
         previous: The one before, whose ids are kept and whose parts are used where they hold.
-        revision: The state of the map, where somebody has made it already.
+        revision: The state of the map, if it is already built.
         recollector: Keeps what is made of the memory; that of `previous` where None.
         pose_doubt: Why the robot may be elsewhere; None for a fresh pose on the map.
-        is_radius_assumed: Nobody has told how large the robot is.
+        is_radius_assumed: The robot's radius is unknown.
 
     Attributes:
         warnings: What a reader of the memory should know.

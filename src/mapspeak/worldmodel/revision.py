@@ -23,8 +23,8 @@ class Hindrance:
     """A part of the floor that is better not driven over where there is another way.
 
     Attributes:
-        extra_m: A way across it counts as at least so much longer.
-        factor: A metre in it counts as at least so many.
+        extra_m: A path across it costs at least this much more.
+        factor: A metre in it costs at least this many metres.
     """
 
     area: ClosedArea
@@ -44,7 +44,7 @@ class Hindrance:
 
 
 MOST_FIELDS = 6
-"""Distances from so many places are kept; on a map of 16 Mcells each takes 16 MB."""
+"""The number of distance fields kept; on a map of 16 Mcells each takes 16 MB."""
 
 
 class MapRevision:

@@ -27,7 +27,7 @@ SAME_PLACE_M = 0.5
 AROUND_M = 1.5
 EVERY_M = 0.1
 CHANGED_RATIO = 0.1
-"""The way is another one when so much of the floor around looks different."""
+"""The path counts as changed when this share of the floor around it looks different."""
 MOST_TRIES = 2
 MOST_KEPT = 50
 

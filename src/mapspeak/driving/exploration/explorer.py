@@ -81,16 +81,16 @@ class Explorer:
     async def advance(
         self, bounds: Bounds | None, *, wait_s: float, on_trip: OnProgress, client: str = ""
     ) -> Progress:
-        """Explore until it ends, pauses, or so much robot time has passed; begin where needed.
+        """Explore until it ends, pauses, or `wait_s` of robot time have passed; begin if needed.
 
-        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+        Cancelling the call cancels the drive and stops the robot.
 
         Args:
             bounds: Where to end; None for those of the exploration that is going on.
             wait_s: Robot time after which to answer, with the robot still under way.
 
         Raises:
-            PolicyError: The robot must not drive now, wherever to; it comes to a stand.
+            PolicyError: The robot must not drive now, to any goal; it is stopped.
         """
         if not self.is_going_on:
             self._trips.begin_count()
@@ -155,9 +155,9 @@ class Explorer:
         return trip.target.id
 
     async def _choose(self, world: WorldModel, ticket: int, client: str) -> TripState | None:
-        """Set out to the next target where there is no trip, or its end has been seen from afar.
+        """Set out to the next target if there is no trip, or its target has been seen from afar.
 
-        Gives None when there is no target left.
+        Return None when no target is left.
         """
         trip = self._trips.current
         if trip is not None and not self._must_turn(world, trip.target):

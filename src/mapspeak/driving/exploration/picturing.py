@@ -32,7 +32,7 @@ class PictureContext(TripContext, Protocol):
 
 
 async def aim(site: PictureContext, goal: CheckedGoal) -> CheckedGoal:
-    """Choose the heading to arrive with, where nobody asked for one and a picture is wanted."""
+    """Choose the heading to arrive with, if none was asked for and a picture is wanted."""
     if goal.purpose is not GoalPurpose.LOOK:
         return goal
     world, views = await site.fetch_world_model(), site.pictures.views
@@ -71,7 +71,7 @@ async def end_for_picture(
         if report.status.state is GoalState.ARRIVED:
             report = await _turn_to_new_walls(site, report, on_progress)
     except (GoalError, PolicyError):
-        # The robot was stopped or belongs to somebody else: how this drive ended stays true.
+        # The robot was stopped or another client drives it: how this drive ended stays true.
         return report
     return report
 

@@ -20,7 +20,7 @@ from mapspeak.worldmodel.closures import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = 0.5
-"""A border is looked at from the floor that is so much more than the robot's radius around it."""
+"""A border is reachable from floor within the robot's radius plus this."""
 OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW, RefusalReason.CLOSED_OFF})
 
 
@@ -58,7 +58,7 @@ class Bounds:
         known_ratio: So much of the floor that is to be expected.
         for_camera: The camera is to see all walls, not the map alone to be complete.
         stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
-            was sent to see, so that somebody can look around.
+            was sent to see, so that the caller can look around.
     """
 
     n_goals: int | None = None

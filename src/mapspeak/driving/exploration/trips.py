@@ -80,7 +80,7 @@ class Target:
 
     Attributes:
         id: F3, W2, or the words for a place that has no id.
-        frontier: The frontier to look over; None where it is none.
+        frontier: The frontier to look over; None for another place.
         earlier: The try before, where the place was blocked then.
     """
 
@@ -213,7 +213,7 @@ class Trips:
     def _take_in_refusal(
         self, target: Target, why: str, *, ticket: int, grid: OccupancyGrid
     ) -> TripState:
-        """Take a refusal for one of the place, unless the robot belongs to somebody else now."""
+        """Take a refusal for one of the place, unless another client drives the robot now."""
         self.end = TripEnd(cause=Cause(code=CauseCode.REFUSED, quote=why))
         if self._is_not_ours(ticket):
             self.current = None

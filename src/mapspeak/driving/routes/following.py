@@ -1,6 +1,6 @@
 """A route under way: which stops are done, which comes next, and why one was left out.
 
-It advances only while somebody waits for it, and a drive that was ended from elsewhere is begun
+It advances only while a call waits for it, and a drive that was ended from elsewhere is begun
 again with the next call.
 """
 
@@ -91,7 +91,7 @@ class RouteBook:
         """Plan a route that takes the place of the one before, and return it.
 
         Args:
-            is_looking: A call ends at each stop, so that somebody can look.
+            is_looking: A call ends at each stop, so that the caller can look.
             order: Whether stops are driven past as they are given, or on the shortest way.
             end_at: A last stop, whatever the order; "start" is where the robot is now.
 
@@ -111,9 +111,9 @@ class RouteBook:
     async def advance(
         self, *, wait_s: float, when_blocked: WhenBlocked, on_progress: OnProgress, client: str = ""
     ) -> RouteProgress:
-        """Follow the route until it ends, pauses, or so much robot time has passed.
+        """Follow the route until it ends, pauses, or `wait_s` of robot time have passed.
 
-        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+        Cancelling the call cancels the drive and stops the robot.
 
         Args:
             wait_s: Robot time after which to answer, with the robot still under way.
@@ -125,7 +125,7 @@ class RouteBook:
         """
         if not self._plan.stops:
             raise GoalError(
-                "There is no route to go on with.",
+                "There is no route to continue.",
                 hint="Begin one with its stops.",
                 step=NextStep.BEGIN_ROUTE,
             )
@@ -225,7 +225,7 @@ class RouteBook:
         self._plan = replace(self._plan, stops=tuple(stops))
 
     async def _give_up(self) -> None:
-        """End the drive of an older route, so that none of it goes on."""
+        """End the drive of an older route, so that it does not continue."""
         if self._goal_id is not None:
             with anyio.CancelScope(shield=True):
                 await self._site.drives.cancel(self._goal_id)

@@ -18,7 +18,7 @@ SHORTER_M = 1e-6
 
 
 class RouteOrder(StrEnum):
-    """Who says in which order stops are driven past."""
+    """What decides the order of the stops."""
 
     AS_GIVEN = "as_given"
     SHORTEST = "shortest"

@@ -24,7 +24,7 @@ START = "start"
 """What the place is called where a route begins."""
 MOST_CANDIDATES = 12
 LEAST_SAID_RATIO = 0.75
-"""Of words that are no name, so much must be said of what they are taken for."""
+"""Words that are not a name need at least this similarity to a place."""
 SAME_SAID_RATIO = 0.9
 """What says so nearly as much of them as the best may be meant too."""
 
@@ -80,7 +80,7 @@ def _find_meanings(world: WorldModel, words: str, error: AmbiguousPlaceError) ->
 
 
 def _find_remembered(world: WorldModel, words: str) -> Iterator[Place]:
-    """Return what is surely meant or says the words; nobody is driven to what is only like them."""
+    """Return what is surely meant or contains the words; similarity alone is never driven to."""
     answer = world.recollection.find(words, limit=MOST_CANDIDATES)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
     most_said = max((each.said_ratio for each in speaking), default=0.0)

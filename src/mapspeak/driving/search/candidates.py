@@ -1,4 +1,4 @@
-"""Where to look for a thing next: remembered places, frontiers, and floor that nobody has seen."""
+"""Where to look for a thing next: remembered places, frontiers, and floor not yet seen."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -33,7 +33,7 @@ NEAR_M = 5.0
 MAY_BE_NEAR = 0.8
 """The score of what lies near something remembered that speaks of the thing, or is like it."""
 LEAST_SAID_RATIO = 0.5
-"""Of the words for the thing, a record says at least so much that speaks of it."""
+"""A record refers to the thing from this similarity on."""
 MOST_REMEMBERED = 12
 
 
@@ -53,7 +53,7 @@ class SearchCandidate:
     Attributes:
         id: W2, T1, P5 or F3; for unseen floor its coordinates.
         area_m2: Floor that is to come into view for the first time, as far as can be told.
-        score: How likely the thing is there, 0.5 where nobody knows.
+        score: How likely the thing is there; 0.5 if unknown.
         rate: What speaks for it: square metres by their likelihood, for each metre of way.
         name: What something remembered, or a picture, is known by during the search.
     """
@@ -227,7 +227,7 @@ def _rated(
 ) -> SearchCandidate:
     looks_at = frontier.anchor if frontier else pose.transform(Point(REACH_M / 2, 0.0))
     own_id = frontier.id if frontier else f"({pose.x:.1f}, {pose.y:.1f})"
-    # Finding rooms takes long, and nobody needs them who thinks nothing of any.
+    # Finding rooms is slow, and not needed without an opinion of any.
     room_id = world.find_room_id(looks_at) if opinions.speaks_of_rooms else None
     score = opinions.score_at(looks_at, ids=(own_id, room_id or ""))
     if any(point.distance_to(looks_at) <= NEAR_M for point in near):

@@ -11,7 +11,7 @@ from mapspeak.memory.search.answer import Entry, EntryKind
 from mapspeak.memory.search.index import EntryIndex
 
 LEAST_SAID_RATIO = 0.25
-"""Of what is looked for, words say at least so much that speak of it.
+"""Words refer to the thing from this similarity on.
 
 Little, since what a detector reports is shown before anybody relies on it.
 """
@@ -51,7 +51,7 @@ _PATTERNS = tuple(
 
 
 def find_context_score(words: str, thing: str) -> float | None:
-    """Find how likely a thing is near what words name, from 0 to 1; None where nobody can say."""
+    """Find how likely a thing is near what words name, from 0 to 1; None if unknown."""
     named, wanted = _rooms_of(words), _rooms_of(thing)
     if not named or not wanted:
         return None
@@ -79,7 +79,7 @@ class Earlier:
     Attributes:
         looks: Those that count as looked at, and did not show it.
         reporting: Those in which the robot's detector reported it, the latest first.
-        n_unread: How many say nothing, for nobody read them.
+        n_unread: How many say nothing, because no model has described them.
     """
 
     looks: tuple[Look, ...] = ()
@@ -115,7 +115,7 @@ def read_earlier(
 def leave_out_shown(
     pictures: Iterable[TakenPicture], memory: SemanticMap, thing: str
 ) -> tuple[TakenPicture, ...]:
-    """Return pictures without those in which somebody saw the thing and wrote it down.
+    """Return the pictures except those in which the thing was seen and noted.
 
     The detector may have had no word for it; where it was seen, the memory says.
     """
@@ -140,15 +140,15 @@ def _apart(pictures: Iterable[TakenPicture]) -> tuple[TakenPicture, ...]:
 
 
 NEUTRAL = 0.5
-"""The score of a place of which nobody thinks anything."""
+"""The score of a place without any opinion."""
 STRENGTH = 4.0
-"""A place that is sure to have the thing weighs so many times more than a neutral one."""
+"""How many times more a place that surely has the thing weighs than a neutral one."""
 REACH_M = 5.0
 """A view says something about what lies this near to the middle of it."""
 VIEW_STRENGTH = 2.0
-"""What the model says of a view counts so many times as much as that nobody knows."""
+"""The weight of the model's opinion of a view against the neutral prior."""
 CONTEXT_STRENGTH = 1.0
-"""What stands at a place counts less: nobody has looked at it with the thing in mind."""
+"""The weight of what stands at a place: less, because it was not noted with the thing in mind."""
 CONTEXT_APART_M = 1.5
 """The same score this near to an earlier one is of the same thing."""
 

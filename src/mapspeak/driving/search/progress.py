@@ -32,7 +32,7 @@ class SearchState(StrEnum):
 
     @property
     def shows_picture(self) -> bool:
-        """True when somebody should judge what the camera sees."""
+        """True when the caller should judge what the camera sees."""
         return self in (SearchState.LOOK, SearchState.REPORTED)
 
 

@@ -40,7 +40,7 @@ from mapspeak.worldmodel.model import WorldModel
 LEFT_RATIO = 0.3
 """Less than this of what a place had to show is left: it was seen on the way."""
 BETTER_RATIO = 1.5
-"""Only what is so much better makes the robot turn when the model has changed its mind."""
+"""When the model changes its mind, the robot turns only for a target this much better."""
 HERE_M = 0.15
 HERE_RAD = math.radians(8)
 SAME_M = 1.0
@@ -49,10 +49,10 @@ APART_M = 2.0
 MOST_NEXT = 6
 UNKNOWN_RANGE_M = 3.0
 DISMISSED_M = 1.5
-"""What the detector reports this near to something that was none is none either."""
+"""Detections this near to a false one are taken for the same false one."""
 
 Choose = Callable[[Sequence[SearchCandidate]], SearchCandidate | None]
-"""Chooses one of several places to look from, which come best first; None for none of them."""
+"""Choose one of several viewpoints, sorted best first; return None to take none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +111,7 @@ class Searcher:
         self._trips.begin_count()
 
     def note_picture(self, picture: CameraPicture) -> None:
-        """Take in that somebody was shown a picture."""
+        """Take in that the caller was shown a picture."""
         self._n_looks += 1
         self._seen.add_look(picture.pose, picture.horizontal_fov_rad)
         self._shown = picture.pose, picture.horizontal_fov_rad
@@ -128,9 +128,9 @@ class Searcher:
         client: str = "",
         earlier: Sequence[TakenPicture] = (),
     ) -> SearchProgress:
-        """Search until there is something to look at, it ends, or so much robot time has passed.
+        """Search until there is something to look at, it ends, or `wait_s` has passed.
 
-        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+        Cancelling the call cancels the drive and stops the robot.
 
         Args:
             thing: What to look for; another one than before begins a new search.
@@ -138,7 +138,7 @@ class Searcher:
             earlier: The pictures so far, the oldest first; a new search begins from them.
 
         Raises:
-            PolicyError: The robot must not drive now, wherever to; it comes to a stand.
+            PolicyError: The robot must not drive now, to any goal; it is stopped.
         """
         key = name_key(thing)
         if self._state.is_end or key != name_key(self._thing):
@@ -266,7 +266,7 @@ class Searcher:
                 self._opinions.add_context(waypoint.pose.point, score)
 
     async def _is_pointless(self, world: WorldModel, here: SearchCandidate) -> bool:
-        """Return True when what the place shows was seen on the way, or nobody can stand there."""
+        """Return True if the place was seen on the way, or the robot cannot stand there."""
         if not has_room_at(world.grid, here.pose.point, radius_m=world.radius_m):
             return True
         if here.name:

@@ -1,4 +1,4 @@
-"""Which floor the camera has looked at from near: what a LiDAR has mapped nobody has seen yet."""
+"""Floor that the camera has seen from near; what the lidar has mapped may not have been seen."""
 
 import math
 from collections.abc import Iterable
@@ -63,11 +63,11 @@ class SeenFloor:
         self._earlier.clear()
 
     def has_look_from(self, pose: Pose) -> bool:
-        """Return True when somebody was shown what is to be seen in a pose."""
+        """Return True if the caller was shown a picture from this pose."""
         return any(_is_like(look, pose, LOOKED_NEAR_M, LOOKED_RAD) for look in self._looks)
 
     def add_look(self, pose: Pose, fov_rad: float | None) -> None:
-        """Note a picture that somebody was shown."""
+        """Note a picture that the caller was shown."""
         self._looks.append(pose)
         self.add(pose, fov_rad)
 

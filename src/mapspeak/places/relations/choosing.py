@@ -1,4 +1,4 @@
-"""From a place that somebody names to the pose the robot drives to."""
+"""From the name of a place to the pose the robot drives to."""
 
 import math
 from dataclasses import dataclass, replace
@@ -67,7 +67,7 @@ class GoalPurpose(StrEnum):
 
     ARRIVE = "arrive"
     LOOK = "look"
-    """To see what is there: nobody asked for a heading."""
+    """To see what is there: no heading was asked for."""
     CHECK = "check"
     """To see whether something remembered is there."""
 
@@ -77,7 +77,7 @@ class CheckedGoal:
     """A pose to drive to, judged against the map.
 
     Attributes:
-        comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
+        comes_straight_on: No heading was asked for: it is that of the path from the robot.
     """
 
     place: Place

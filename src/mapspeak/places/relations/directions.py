@@ -28,12 +28,12 @@ SECTOR_RAD = math.radians(40)
 """A place still lies in a direction so far off it."""
 AWAY_M = 1.0
 FARTHEST_M = 2.5
-"""A place that is said to be on a side of a thing is at most so far from it."""
+"""A place on a side of a thing is at most this far from it."""
 BESIDE_DOOR_M = 0.6
 BEYOND_RAD = math.radians(60)
 """So far off the way through a door is still through it, and not along its wall."""
 HERE_M = 0.3
-"""From so near nobody sees a thing from one side."""
+"""From nearer than this, a thing has no sides."""
 TURNS = {Side.FRONT: 0.0, Side.LEFT: math.pi / 2, Side.BEHIND: math.pi, Side.RIGHT: -math.pi / 2}
 """From a thing's own front to its sides; who looks at it has left and right the other way."""
 
@@ -190,7 +190,7 @@ def _search(
     """Find the place nearest to what is aimed at, and how far from the thing it is.
 
     Args:
-        is_asked: Somebody said how far.
+        is_asked: The words say how far.
     """
     along = np.array([math.cos(aim.heading_rad), math.sin(aim.heading_rad)])
     offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])

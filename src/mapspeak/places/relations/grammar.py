@@ -42,7 +42,7 @@ class Towards:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Away:
-    """A place so far from a thing, in any direction."""
+    """A place at a given distance from a thing, in any direction."""
 
     of: str
     away_m: float
@@ -185,7 +185,7 @@ Read = Callable[[re.Match[str]], Relation | None]
 
 
 def parse_relation(words: str) -> Relation | None:
-    """Return the relation that words begin with; None where they are none."""
+    """Return the relation that words express; None for other words."""
     if len(words) > LONGEST:
         return None
     wanted = plain(words)

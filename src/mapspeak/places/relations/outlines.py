@@ -30,7 +30,7 @@ LEAST_WALL_RATIO = 0.5
 """So much of a side must be wall; the rest may be doors and openings."""
 AT_CORNER_M = 1.5
 AT_WALL_M = 0.8
-"""Who stands at a wall has at most so much room between it and the robot's own circle."""
+"""The most room between a wall and the circle of a robot that stands at it."""
 MIDDLE_M = 2.0
 SAME_SIDE_RAD = math.radians(46)
 LONG_RATIO = 0.3
@@ -305,7 +305,7 @@ def _is_corner(one: Wall, other: Wall) -> bool:
 
 
 def _is_wall(world: WorldModel, side: Wall) -> bool:
-    """Return True where most of what lies behind a long side is no floor."""
+    """Return True if most of what lies behind a long side is not floor."""
     if side.length_m < LEAST_WALL_M:
         return False
     grid = world.grid

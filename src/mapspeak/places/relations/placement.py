@@ -97,7 +97,7 @@ class ReachableCells:
 
 
 def find_reachable_cells(world: WorldModel, centre: Point, reach_m: float) -> ReachableCells:
-    """Find the reachable cells at most so far from a place to each side."""
+    """Find the reachable cells in the square of `reach_m` to each side of a place."""
     grid = world.grid
     window = grid.window_around(centre, reach_m)
     at_rows, at_cols = np.nonzero(grid.free[window])
@@ -164,5 +164,5 @@ def join_or(words: Sequence[str]) -> str:
 
 
 def tolerance_m(resolution_m: float) -> float:
-    """Return how far off a distance may be that somebody asked for."""
+    """Return how far off an asked distance may be."""
     return max(0.1, 0.75 * resolution_m)

@@ -1,4 +1,4 @@
-"""Places next to a thing, so far from it, in sight of it, and half way between two."""
+"""Places next to a thing, at a distance from it, in sight of it, and half way between two."""
 
 import math
 
@@ -22,15 +22,15 @@ from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = (0.15, 0.7)
-"""What is next to a thing leaves so much room between it and the robot's own circle."""
+"""The least and most room between a thing and the circle of a robot next to it."""
 NEARLY_M = 1.5
 LEAST_SIGHT_M, SIGHT_M = 0.3, 3.0
-"""Who faces a thing leaves so much room before the robot, and is at most so far away."""
+"""The least room before a robot that faces a thing, and the farthest it stands away."""
 NEAR_DOOR_M = 1.5
 
 
 def stand_away(world: WorldModel, thing: Referent, away_m: float) -> Place:
-    """Find the place nearest to the robot that is so far from a thing.
+    """Find the place nearest to the robot at a given distance from a thing.
 
     Raises:
         GoalError: There is none; the hint names the distances between which there are some.

@@ -222,7 +222,7 @@ def find_known(world: WorldModel, words: str) -> Referent | None:
     """Find what is called so, without reading any relation in it; None where nothing is.
 
     Raises:
-        GoalError: Several things are called so, or nobody noted where the thing is.
+        GoalError: Several things have that name, or the thing's position is unknown.
     """
     for wanted in dict.fromkeys((words.strip(), plain(words))):
         place = find_named(world, wanted) or _find_loosely(world, wanted)

@@ -246,7 +246,7 @@ class Reader:
     def _stand_in_middle(self, thing: Referent) -> Place:
         if thing.region is None:
             raise refuse(
-                f"{thing.name} is no room or corridor, so it has no middle.",
+                f"{thing.name} is not a room or corridor, so it has no middle.",
                 [thing.name, f"next to {thing.name}"],
             )
         return stand_in_middle(self._world, thing.region)
@@ -308,7 +308,7 @@ class Reader:
         thing = self._refer(words, n_left)
         if thing.region is None:
             raise refuse(
-                f"{thing.name} is no room or corridor: it has no corners or walls.",
+                f"{thing.name} is not a room or corridor: it has no corners or walls.",
                 [f"next to {thing.name}"],
             )
         return thing.region
@@ -322,7 +322,8 @@ class Reader:
 def _check_distance(away_m: float | None) -> None:
     if away_m is not None and not 0 < away_m < math.inf:
         raise refuse(
-            f"{away_m:g} m is no distance.", else_hint="Give metres above zero, such as 1.5 m."
+            f"{away_m:g} m is not a valid distance.",
+            else_hint="Give metres above zero, such as 1.5 m.",
         )
 
 

@@ -238,7 +238,7 @@ def _is_at(world: WorldModel, thing: Sized | RememberedPlace, at: Referent | Non
     if at is None:
         return True
     if at.region is None:
-        raise refuse(f"{at.name} is no room or corridor.")
+        raise refuse(f"{at.name} is not a room or corridor.")
     match thing:
         case Door(region_ids=region_ids):
             return at.region.id in region_ids

@@ -9,7 +9,7 @@ from mapspeak.places.things import RANKS
 
 
 class Side(StrEnum):
-    """A side of a thing, its own where it has a front, else as somebody sees it."""
+    """A side of a thing, its own if it has a front, else as seen by a viewer."""
 
     LEFT = "left of"
     RIGHT = "right of"
