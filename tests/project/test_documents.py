@@ -18,6 +18,8 @@ DOCUMENTS = sorted([*CHECKOUT.glob("*.md"), *CHECKOUT.glob("docs/**/*.md")])
 BLOCK = re.compile(r"^( *)```(\w+)[^\n]*\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 INLINE_COMMAND = re.compile(r"(?<!`)`((?:\./run|mapspeak) [^`\n]+)`(?!`)")
 LINK = re.compile(r"\]\(([^)\s#]+)[^)]*\)")
+LINK_TO_HEADING = re.compile(r"\]\(([^)\s#:]*)#([^)\s]+)\)")
+HEADING = re.compile(r"^#+ +(.+)$", re.MULTILINE)
 END_OF_COMMAND = {"|", "||", "&&", "&", ";", ">", "<", "2>"}
 
 
@@ -132,3 +134,20 @@ def test_links_to_files_lead_somewhere() -> None:
         for target in LINK.findall(document.read_text())
         if "://" not in target and not (document.parent / target).exists()
     ] == []
+
+
+def anchors_of(document: Path) -> set[str]:
+    """Returns the anchors that a forge makes of the headings."""
+    titles = HEADING.findall(document.read_text())
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_links_to_headings_lead_somewhere() -> None:
+    dead = [
+        f"{named(document)}: {path}#{anchor}"
+        for document in DOCUMENTS
+        for path, anchor in LINK_TO_HEADING.findall(document.read_text())
+        if anchor not in anchors_of((document.parent / path) if path else document)
+    ]
+
+    assert not dead
