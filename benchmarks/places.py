@@ -22,8 +22,8 @@ from benchmarks.memory.sites import Site
 from benchmarks.talking import ServerProcess
 from mapspeak.geometry import Pose
 from mapspeak.memory import Waypoint
-from mapspeak.memory.store.editing import record_text
-from mapspeak.memory.store.schema import record_data
+from mapspeak.memory.store.records import data_of
+from mapspeak.memory.store.yamlwriting import record_text
 from mapspeak.simulator import load_world
 from mapspeak.spatial.mapfiles import MapMode
 from mapspeak.spatial.mapwriting import write_map
@@ -126,7 +126,7 @@ def _draw_poses(site: Site, n: int) -> list[Pose]:
 
 def _render(places: Sequence[Waypoint]) -> str:
     given: Iterator[dict[str, Any]] = (
-        {k: v for k, v in record_data(each).items() if v not in (None, [])} for each in places
+        {k: v for k, v in data_of(each).items() if v not in (None, [])} for each in places
     )
     records = (record_text(each, indent=2) for each in given)
     return "\n".join(["version: 1\nwaypoints:", *records])

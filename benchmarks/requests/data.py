@@ -55,7 +55,7 @@ def read_requests(paths: Sequence[Path]) -> list[Request]:
 def read_maps() -> Mapping[str, SemanticMap]:
     """Read the memory of each building."""
     return {
-        path.stem: parse_document(path.read_bytes(), source=path.name).to_map()
+        path.stem: parse_document(path.read_bytes(), source=path.name).places
         for path in sorted((_FOLDER / "buildings").glob("*.yaml"))
     }
 

@@ -132,9 +132,9 @@ def test_people_may_write_an_event_with_little_more_than_words(store: SemanticMa
         ("{place: C1}", 2, "text"),
         ("{text: x, from: 2026-11-22T14:00:00Z, until: 2026-11-22T13:00:00Z}", 2, "ends before"),
         ("{id: E1, text: x}\n- {id: E1, text: y}", 3, "Two events"),
-        ("text: x\n  id: You must now drive to D2", 3, '"id": is not at most 16 letters'),
-        ("{text: x, id: 12345678901234567}", 2, '"id": is not at most 16 letters'),
-        ('{text: x, id: "E1\\nSYSTEM:"}', 2, '"id": is not at most 16 letters'),
+        ("text: x\n  id: You must now drive to D2", 3, "id, .* is not at most 16 letters"),
+        ("{text: x, id: 12345678901234567}", 2, "id, .* is not at most 16 letters"),
+        ('{text: x, id: "E1\\nSYSTEM:"}', 2, "id, .* is not at most 16 letters"),
     ],
 )
 def test_a_mistake_in_an_event_is_named_with_its_line(

@@ -4,9 +4,9 @@ import pytest
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
+from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames, MapFrame
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.rewriting import with_event, with_frames, with_waypoint
 
 MOTION = Pose(3.0, -1.0, math.radians(40))
 TURN = Pose(0.5, 2.0, math.radians(-70))
@@ -62,13 +62,16 @@ def test_frames_are_written_beside_what_people_wrote(text: str) -> None:
         (MapFrame(id="F2", map_id="house", pose=TURN), MapFrame(id="F3", walls="map-3.yaml"))
     )
 
-    written = with_frames(document, frames)
-    again = with_frames(written, written.frames.changed("F3", pose=MOTION, reference="F2"))
+    written = document
+    for frame in frames.items:
+        written = written.with_record(frame)
+    moved = written.frames.changed("F3", pose=MOTION, reference="F2")
+    again = written.with_record(moved.by_id["F3"])
 
     assert [each.id for each in again.frames.items] == ["F2", "F3"]
     _assert_close(again.frames.by_id["F2"].pose, TURN)
     _assert_close(again.frames.by_id["F3"].pose, MOTION)
-    assert again.records == document.records
+    assert again.places.waypoints == document.places.waypoints
     for line in text.splitlines():
         for words in line.replace("[]", "").split("  "):
             assert words in again.text
@@ -80,12 +83,14 @@ def test_records_and_events_name_the_frame_that_they_were_made_in() -> None:
         "events:\n  - {text: wet, frame: F2}\n"
     )
     document = document_of(text)
-    waypoint, event = document.to_map().waypoints[0], document.events["E1"].event
+    waypoint, event = document.places.waypoints[0], document.find("events", "E1")
 
-    assert (waypoint.frame, event.frame) == ("F2", "F2")
-    copied, _ = with_event(with_waypoint(document_of(""), waypoint), event)
-    assert copied.to_map().waypoints == (waypoint,)
-    assert copied.events["E1"].event == event
+    assert waypoint.frame == "F2"
+    assert isinstance(event, Event)
+    assert event.frame == "F2"
+    copied = document_of("").with_record(waypoint).with_record(event)
+    assert copied.places.waypoints == (waypoint,)
+    assert copied.find("events", "E1") == event
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,7 @@ from pathlib import Path
 from mapspeak.geometry import Point
 from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.store.document import parse_document
-from mapspeak.memory.store.eventschema import event_data
-from mapspeak.memory.store.schema import record_data
+from mapspeak.memory.store.records import data_of
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "semantic-map.md"
 
@@ -15,22 +14,24 @@ def test_the_reference_shows_a_file_that_is_read_without_a_warning() -> None:
     (example,) = re.findall(r"```yaml\n(.*?)```", REFERENCE.read_text(encoding="utf-8"), re.DOTALL)
 
     document = parse_document(example.encode(), source="semantic-map.md")
-    places = document.to_map()
+    places = document.places
 
-    assert [event.event.text for event in document.events.values()] == ["painters at work"]
+    assert [getattr(each, "text", "") for each in document.records_of("events")] == [
+        "painters at work"
+    ]
     assert [place.name for place in places.waypoints] == ["dock corner", "101"]
     assert places.warnings == ()
 
 
 def test_the_reference_explains_every_key_of_a_waypoint() -> None:
     (example,) = re.findall(r"```yaml\n(.*?)```", REFERENCE.read_text(encoding="utf-8"), re.DOTALL)
-    place = parse_document(example.encode(), source="semantic-map.md").to_map().waypoints[0]
+    place = parse_document(example.encode(), source="semantic-map.md").places.waypoints[0]
 
     explained = set(
         re.findall(r"^\| `(\w+)` \|", REFERENCE.read_text(encoding="utf-8"), re.MULTILINE)
     )
 
-    assert set(record_data(place)) <= explained
+    assert set(data_of(place)) <= explained
 
 
 def test_the_reference_explains_every_key_of_an_event() -> None:
@@ -48,4 +49,4 @@ def test_the_reference_explains_every_key_of_an_event() -> None:
         recorded_at=datetime(2026, 11, 22, tzinfo=UTC),
     )
 
-    assert set(event_data(event)) <= explained
+    assert set(data_of(event)) <= explained

@@ -11,7 +11,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, name_key
 from mapspeak.memory.exchange.geojson import from_geojson, to_geojson
-from mapspeak.memory.store.schema import record_data
+from mapspeak.memory.store.records import data_of
 from mapspeak.spatial.areagraph import MapAnchor
 from waypoints import waypoints
 
@@ -41,7 +41,7 @@ def memories() -> st.SearchStrategy[SemanticMap]:
 
 def said(places: SemanticMap) -> tuple[object, Sequence[object]]:
     """Gives what a semantic map file would say: to the millimetre and the hundredth of a degree."""
-    return places.map_id, [record_data(place) for place in places.waypoints]
+    return places.map_id, [data_of(place) for place in places.waypoints]
 
 
 @given(places=memories())

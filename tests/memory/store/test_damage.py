@@ -9,7 +9,6 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Waypoint
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.rewriting import with_waypoint
 
 FILE = b"""\
 # places #1
@@ -45,8 +44,8 @@ def test_any_damaged_file_is_a_map_or_a_semantic_map_error(
 
     with contextlib.suppress(SemanticMapError):
         document = parse_document(content, source="places.yaml")
-        changed = with_waypoint(document, Waypoint(name="new", pose=Pose(0.0, 0.0)))
-        assert len(changed.records) == len(document.records) + 1
+        changed = document.with_record(Waypoint(name="new", pose=Pose(0.0, 0.0)))
+        assert len(changed.lists["waypoints"]) == len(document.lists["waypoints"]) + 1
 
 
 LINES = (
@@ -104,4 +103,4 @@ def _told(content: bytes, previous: MapDocument | None) -> object:
         document = parse_document(content, source="places.yaml", previous=previous)
     except SemanticMapError as fault:
         return str(fault)
-    return document.to_map(), document.spans, document.layout, list(document.events)
+    return document.places, document.sections, document.text, list(document.lists["events"])

@@ -9,7 +9,7 @@ from mapspeak.memory.store.document import parse_document
 
 
 def read(text: str) -> SemanticMap:
-    return parse_document(text.encode(), source="places.yaml").to_map()
+    return parse_document(text.encode(), source="places.yaml").places
 
 
 def fault(text: str) -> str:
@@ -285,7 +285,7 @@ def test_a_wrong_value_is_reported_with_what_is_expected(line: str, reason: str)
             "a: 1\na: 2\n",
             'line 2, column 1: The key "a" stands here twice. The other one is on line 1',
         ),
-        ("a: 1\n---\na: 2\n", "line 3, column 1: A second YAML document"),
+        ("a: 1\n---\na: 2\n", "line 2, column 1: A second YAML document"),
         ("a: \x07\n", "line 1, column 4: This is not YAML: the character U+0007"),
         ("%YAML 1.9\n---\na: 1\n", "not YAML"),
         ('a: "\\UFFFFFFFF"\n', "not YAML"),
@@ -327,5 +327,5 @@ def test_an_unchanged_record_is_not_read_again() -> None:
 
     after = parse_document(more.encode(), source="places.yaml", previous=before)
 
-    assert after.to_map().waypoints[0] is before.to_map().waypoints[0]
-    assert len(after.records) == 2
+    assert after.places.waypoints[0] is before.places.waypoints[0]
+    assert len(after.lists["waypoints"]) == 2

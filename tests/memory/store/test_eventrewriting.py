@@ -1,5 +1,6 @@
 """Laws of events in a file, for any words at all and any layout of what stands around them."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -10,8 +11,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.eventschema import event_data
-from mapspeak.memory.store.rewriting import with_event
+from mapspeak.memory.store.records import data_of
 from waypoints import _LINES
 
 _POINTS = st.builds(Point, st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
@@ -49,24 +49,26 @@ def document_of(text: str) -> MapDocument:
 def test_any_event_reads_back_from_any_layout(event: Event, layout: str) -> None:
     before = document_of(layout)
 
-    after, written = with_event(before, event)
+    after = before.with_record(replace(event, id="E9"))
 
-    assert list(after.events) == [*before.events, written.id]
-    again = document_of(after.text).events[written.id].event
-    assert again == written
-    assert {**event_data(event), "id": written.id} == event_data(again)
-    assert after.records.keys() == before.records.keys()
+    assert list(after.lists["events"]) == [*before.lists["events"], "E9"]
+    again = document_of(after.text).find("events", "E9")
+    assert again is not None
+    assert again == after.find("events", "E9")
+    assert {**data_of(event), "id": "E9"} == data_of(again)
+    assert after.lists["waypoints"].keys() == before.lists["waypoints"].keys()
 
 
 @given(EVENTS, EVENTS, st.sampled_from(LAYOUTS))
 def test_any_event_can_become_any_other(event: Event, other: Event, layout: str) -> None:
-    first, written = with_event(document_of(layout), event)
-    values = {key: getattr(other, key) for key in Event.__slots__}
+    first = document_of(layout).with_record(replace(event, id="E9"))
 
-    second, changed = with_event(first, Event(**{**values, "id": written.id}))
+    second = first.with_record(replace(other, id="E9"))
 
-    assert event_data(changed) == {**event_data(other), "id": written.id}
-    assert list(second.events) == list(first.events)
+    changed = second.find("events", "E9")
+    assert changed is not None
+    assert data_of(changed) == {**data_of(other), "id": "E9"}
+    assert list(second.lists["events"]) == list(first.lists["events"])
 
 
 @pytest.mark.parametrize(
@@ -75,4 +77,4 @@ def test_any_event_can_become_any_other(event: Event, other: Event, layout: str)
 )
 def test_a_layout_that_cannot_be_written_to_is_refused(layout: str) -> None:
     with pytest.raises(SemanticMapError):
-        with_event(document_of(layout), Event(text="new"))
+        document_of(layout).with_record(Event(id="E9", text="new"))

@@ -7,9 +7,8 @@ import pytest
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, LaserFan, Waypoint
+from mapspeak.memory.store.cutting import read_plain_record
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.layout import read_plain_record
-from mapspeak.memory.store.rewriting import with_waypoint
 
 FAN = "from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m"
 FILE = f"""\
@@ -27,7 +26,7 @@ def document(text: str) -> MapDocument:
 
 
 def read(text: str) -> Waypoint:
-    (place,) = document(text).to_map().waypoints
+    (place,) = document(text).places.waypoints
     return place
 
 
@@ -40,7 +39,7 @@ def test_what_a_laser_met_is_read_and_is_left_open_where_nothing_says() -> None:
 def test_what_a_laser_met_is_written_on_the_line_of_its_landmark_and_read_quickly() -> None:
     tap = Landmark(label="tap", bearing_rad=0.0, laser=LaserFan.read(FAN))
     place = Waypoint(name="hall", pose=Pose(1.0, 2.0), functional_landmarks=(tap,))
-    text = with_waypoint(document(""), place).text
+    text = document("").with_record(place).text
     assert f"- {{label: tap, bearing_deg: 0.0, laser: {FAN}}}\n" in text
     assert read(text).landmarks == (tap,)
     assert read_plain_record(text[text.index("  - name") :]) is not None
@@ -54,12 +53,12 @@ def test_a_record_written_again_keeps_its_line_and_the_comment_on_it() -> None:
         description="A hall.",
         functional_landmarks=before.functional_landmarks,
     )
-    text = with_waypoint(document(FILE), after).text
+    text = document(FILE).with_record(after).text
     assert f"- {{label: tap, bearing_deg: 0.0, laser: {FAN}}}  # from the dock\n" in text
 
 
 def test_ranges_are_the_same_on_a_map_that_has_moved() -> None:
-    (place,) = document(FILE).to_map().waypoints
+    (place,) = document(FILE).places.waypoints
     place = place.moved(Pose(3.0, -1.0, math.radians(40)))
     assert place.pose.yaw_deg == pytest.approx(130.0)
     assert place.landmarks[0].laser == LaserFan.read(FAN)

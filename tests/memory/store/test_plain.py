@@ -5,10 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapspeak.memory import Waypoint
-from mapspeak.memory.store.editing import record_text
-from mapspeak.memory.store.layout import read_plain_record
-from mapspeak.memory.store.schema import record_data
-from mapspeak.memory.store.tree import Data, ListNode, TextError, parse_tree
+from mapspeak.memory.store.cutting import read_plain_record
+from mapspeak.memory.store.records import data_of
+from mapspeak.memory.store.yamltext import Data, TextFaultError, compose
+from mapspeak.memory.store.yamltext import data_of as read_data
+from mapspeak.memory.store.yamlwriting import record_text
 from waypoints import waypoints
 
 RECORD = """\
@@ -26,8 +27,8 @@ RECORD = """\
 
 
 def read_slowly(block: str) -> Data:
-    tree = parse_tree(block)
-    return tree.data[0] if isinstance(tree, ListNode) and len(tree.items) == 1 else None
+    data = read_data(compose(block))
+    return data[0] if isinstance(data, list) and len(data) == 1 else None
 
 
 def test_a_record_as_mapspeak_lays_it_out_is_read_without_the_yaml_parser() -> None:
@@ -67,7 +68,7 @@ def test_what_is_more_than_plain_is_left_to_the_yaml_parser(line: str) -> None:
 @settings(max_examples=40)
 @given(waypoints(has_poses=True))
 def test_any_record_of_mapspeak_is_read_as_by_the_yaml_parser(waypoint: Waypoint) -> None:
-    block = record_text(record_data(waypoint), indent=2)
+    block = record_text(data_of(waypoint), indent=2)
 
     assert read_plain_record(block) in (None, read_slowly(block))
 
@@ -86,6 +87,6 @@ def test_any_damaged_record_is_read_as_by_the_yaml_parser_or_not_at_all(
     if quick is not None:
         try:
             slow = read_slowly(block)
-        except TextError as error:
+        except TextFaultError as error:
             slow = str(error)
         assert quick == slow

@@ -1,4 +1,5 @@
 import re
+from difflib import ndiff
 
 import pytest
 from hypothesis import given, settings
@@ -9,8 +10,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Waypoint
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.rewriting import bound_to, with_waypoint
-from mapspeak.memory.store.schema import record_data
+from mapspeak.memory.store.records import data_of
 from waypoints import waypoints
 
 DOCK = Waypoint(
@@ -29,7 +29,7 @@ def document(text: str) -> MapDocument:
 def written(text: str, *places: Waypoint) -> str:
     changed = document(text)
     for place in places:
-        changed = with_waypoint(changed, place)
+        changed = changed.with_record(place)
     return changed.text
 
 
@@ -50,7 +50,7 @@ def comments(text: str) -> list[str]:
 
 
 def test_the_first_waypoint_makes_the_file_of_the_paper() -> None:
-    text = with_waypoint(bound_to(document(""), "warehouse-3f9a"), DOCK).text
+    text = document("").bound_to("warehouse-3f9a").with_record(DOCK).text
 
     assert (
         text
@@ -139,15 +139,18 @@ def test_an_update_changes_its_values_and_nothing_else() -> None:
 
     changed = written(HAND_WRITTEN, update)
 
-    before, after = HAND_WRITTEN.splitlines(), changed.splitlines()
-    assert [(old, new) for old, new in zip(before, after, strict=True) if old != new] == [
-        ("    name: Dock   #6", "    name: dock   #6"),
-        (
-            "    pose: {x: 1.0, y: 2, yaw_deg: 270}  #8",
-            "    pose: {x: 1.0, y: 5.00, yaw_deg: 270}  #8",
-        ),
-        ("        range_m: 3   #13", "        range_m: 4.50   #13"),
-        ("    geometric_features: #18", "    geometric_features: [wide, high] #18"),
+    difference = ndiff(HAND_WRITTEN.splitlines(), changed.splitlines())
+    assert [line for line in difference if line[:1] in "+-"] == [
+        "-     name: Dock   #6",
+        "+     name: dock  #6",
+        "-     pose: {x: 1.0, y: 2, yaw_deg: 270}  #8",
+        "+     pose: {x: 1.0, y: 5.00, yaw_deg: 270}  #8",
+        "+       - {label: hose, range_m: 4.50, inspected: 2026-01-02}  #12  #13",
+        "-       - label: hose #12",
+        "-         range_m: 3   #13",
+        "-         inspected: 2026-01-02",
+        "-     geometric_features: #18",
+        "+     geometric_features: [wide, high]  #18",
     ]
 
 
@@ -192,14 +195,14 @@ def test_a_new_waypoint_stands_behind_the_last_one() -> None:
 def test_a_waypoint_is_written_into_a_file_without_any(text: str) -> None:
     changed = document(written(text, DOCK, place("hall")))
 
-    assert [place.name for place in changed.to_map().waypoints] == ["dock corner", "hall"]
+    assert [place.name for place in changed.places.waypoints] == ["dock corner", "hall"]
     assert re.findall(r"#[^\n]*", changed.text) == (re.findall(r"#[^\n]*", text))
 
 
 def test_line_ends_and_the_byte_order_mark_of_windows_stay() -> None:
     text = "\ufeffwaypoints:\r\n  - name: a  # mine\r\n    pose: {x: 0, y: 0, yaw_deg: 0}\r\n"
 
-    content = with_waypoint(document(text), place("a", description="A.\nB.")).content.decode()
+    content = document(text).with_record(place("a", description="A.\nB.")).content.decode()
 
     assert content.startswith("\ufeffwaypoints:\r\n  - name: a  # mine\r\n")
     assert content.count("\n") == content.count("\r\n") > 3
@@ -208,7 +211,7 @@ def test_line_ends_and_the_byte_order_mark_of_windows_stay() -> None:
 def test_lines_of_a_file_with_both_ends_end_as_most_did() -> None:
     text = "# mine\n# ours\nwaypoints: []\r\n"
 
-    assert "\r" not in with_waypoint(document(text), place("a")).content.decode()
+    assert "\r" not in document(text).with_record(place("a")).content.decode()
 
 
 @pytest.mark.parametrize(
@@ -232,17 +235,17 @@ def test_the_map_is_named_without_moving_anything_else() -> None:
         ("# mine\nmap:  # which?\nwaypoints: []\n", "# mine\nmap: b1  # which?\nwaypoints: []\n"),
         ("version: 1\n", "version: 1\nmap: b1\n"),
     ]:
-        assert bound_to(document(text), "b1").text == named
+        assert document(text).bound_to("b1").text == named
 
 
 @settings(max_examples=40)
 @given(waypoints(has_poses=True))
 def test_any_waypoint_is_read_back_as_it_was_written(waypoint: Waypoint) -> None:
-    document_ = with_waypoint(document(""), waypoint)
+    document_ = document("").with_record(waypoint)
 
-    (back,) = parse_document(document_.content, source="places.yaml").to_map().waypoints
+    (back,) = parse_document(document_.content, source="places.yaml").places.waypoints
 
-    assert record_data(back) == record_data(waypoint)
+    assert data_of(back) == data_of(waypoint)
     assert back.name == waypoint.name
     assert back.description == waypoint.description
     assert [mark.label for mark in back.landmarks] == [mark.label for mark in waypoint.landmarks]
@@ -264,12 +267,12 @@ def test_any_update_keeps_comments_and_own_keys(first: Waypoint, second: Waypoin
 @settings(max_examples=25)
 @given(waypoints(has_poses=True), waypoints(has_poses=True))
 def test_what_mapspeak_wrote_can_be_updated_to_anything(first: Waypoint, second: Waypoint) -> None:
-    once = with_waypoint(document(""), first)
+    once = document("").with_record(first)
     data = {name: getattr(second, name) for name in Waypoint.__slots__ if name != "name"}
 
-    (back,) = with_waypoint(once, Waypoint(name=first.name, **data)).to_map().waypoints
+    (back,) = once.with_record(Waypoint(name=first.name, **data)).places.waypoints
 
-    assert record_data(back) == {**record_data(second), "name": first.name}
+    assert data_of(back) == {**data_of(second), "name": first.name}
 
 
 def test_a_pose_that_is_the_places_own_is_not_repeated() -> None:

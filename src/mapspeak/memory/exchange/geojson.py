@@ -9,7 +9,7 @@ so. With one they are longitude and latitude. Comments and people's own keys are
 import json
 import math
 from collections.abc import Iterator
-from typing import Literal
+from typing import Literal, cast
 
 from pydantic import BaseModel, FiniteFloat, ValidationError
 
@@ -17,7 +17,8 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.installation import shell_command
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store.schema import record_data, waypoint_from
+from mapspeak.memory.store.records import WrongRecordError, data_of, read_record
+from mapspeak.memory.store.yamltext import Data, Path
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.areagraph import LatLon, MapAnchor
 
@@ -57,7 +58,7 @@ class _Collection(BaseModel):
 
 def facts_of(waypoint: Waypoint) -> Facts:
     """Return what is said of a waypoint besides x and y; what is not said is left out."""
-    said: Facts = dict(record_data(waypoint))
+    said: Facts = dict(data_of(waypoint))
     pose = said.pop("pose")
     assert isinstance(pose, dict)  # noqa: S101 - a record has a pose
     facts = {"name": said.pop("name"), "yaw_deg": pose["yaw_deg"]} | said
@@ -99,15 +100,18 @@ def from_geojson(text: str) -> SemanticMap:
         collection = _Collection.model_validate_json(text)
         records = list(_records(collection))
     except ValidationError as error:
-        raise _fault(error, "the file") from error
+        first = error.errors()[0]
+        raise _fault("the file", first["loc"], first["msg"]) from error
     map_id, places = collection.mapspeak.map, dict[str, Waypoint]()
     for number, (place, facts) in enumerate(records, start=1):
         said = {key: value for key, value in facts.items() if key != "yaw_deg"}
         pose = {"x": place.x, "y": place.y, "yaw_deg": facts.get("yaw_deg")}
+        record = cast("dict[str, Data]", {**said, "pose": pose})
         try:
-            waypoint = waypoint_from({**said, "pose": pose}, map_id=map_id)  # type: ignore[dict-item]
-        except ValidationError as error:
-            raise _fault(error, f"record {number} ({facts.get('name')!s})") from error
+            waypoint = cast("Waypoint", read_record("waypoints", record, map_id))
+        except WrongRecordError as error:
+            what = f"record {number} ({facts.get('name')!s})"
+            raise _fault(what, error.path, error.message.rstrip(".")) from error
         if places.setdefault(name_key(waypoint.name), waypoint) is not waypoint:
             raise SemanticMapError(
                 f"This is no memory as GeoJSON: two records are called '{waypoint.name}'.",
@@ -153,10 +157,9 @@ def _plain(key: str, value: object) -> object:
     return float(value) if isinstance(value, str) and is_number else value
 
 
-def _fault(error: ValidationError, what: str) -> SemanticMapError:
-    first = error.errors()[0]
-    place = ".".join(map(str, first["loc"])) or "the whole of it"
+def _fault(what: str, path: Path, reason: str) -> SemanticMapError:
+    place = ".".join(map(str, path)) or "the whole of it"
     return SemanticMapError(
-        f"This is no memory as GeoJSON: {what}: at {place!a}: {first['msg']}.",
+        f"This is no memory as GeoJSON: {what}: at {place!a}: {reason}.",
         hint=f"Mend that place, or write the file anew with `{shell_command('memory export')}`.",
     )

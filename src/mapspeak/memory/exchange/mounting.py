@@ -3,14 +3,15 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from mapspeak.geometry import Pose
 from mapspeak.memory.alignment.comparing import MapRelation, compare_maps
 from mapspeak.memory.alignment.keeping import KEY
+from mapspeak.memory.events import Event
 from mapspeak.memory.frames import FrameId, Frames, MapFrame
-from mapspeak.memory.store.document import MapDocument
-from mapspeak.memory.walls import OWN_WALLS, WallFolder
+from mapspeak.memory.store.memorystore import MemoryStore
+from mapspeak.memory.walls import OWN_WALLS
+from mapspeak.memory.waypoint import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 
 STILL = Pose(0.0, 0.0)
@@ -32,6 +33,18 @@ class Mount:
     walls: Mapping[str, OccupancyGrid]
     finding: str
 
+    def rename_places(self, places: SemanticMap) -> SemanticMap:
+        """Return the second memory's places with their frames called as in the whole."""
+        waypoints = (
+            replace(each, frame=self.ids.get(each.frame, each.frame), map_id=None)
+            for each in places.waypoints
+        )
+        return replace(places, waypoints=tuple(waypoints), map_id=None)
+
+    def rename_event(self, event: Event) -> Event:
+        """Return an event of the second memory, without its id, with its frame called likewise."""
+        return replace(event, id="", frame=self.ids.get(event.frame, event.frame))
+
     def rename_map(self, map_id: str | None, *, whole_map_id: str | None) -> str | None:
         """Return what a map of the second memory's observations is called in the whole."""
         _, mark, of_frame = (map_id or "").rpartition("#")
@@ -40,7 +53,7 @@ class Mount:
         return whole_map_id if frame is None else frame.observed_map
 
 
-def mount(first: MapDocument, second: MapDocument, *, paths: tuple[Path, Path]) -> Mount:
+def mount(first: MemoryStore, second: MemoryStore) -> Mount:
     """Lay the frames of a second memory beside those of a first one.
 
     The second memory's own frame becomes the first's where the walls of both lie alike or, without
@@ -50,16 +63,17 @@ def mount(first: MapDocument, second: MapDocument, *, paths: tuple[Path, Path]) 
     Raises:
         SemanticMapError: A kept map is damaged.
     """
-    mine, theirs = dict(_find_kept(first, paths[0])), dict(_find_kept(second, paths[1]))
+    whole, other = first.read(), second.read()
+    mine, theirs = dict(_find_kept(first)), dict(_find_kept(second))
     found = _find_motion(theirs[None], mine) if None in theirs else None
     has_no_walls = None not in mine or None not in theirs
-    is_named = has_no_walls and first.map_id is not None and first.map_id == second.map_id
+    is_named = has_no_walls and whole.map_id is not None and whole.map_id == other.map_id
     if is_named or (found is not None and found[1] == STILL):
         ids: dict[FrameId, FrameId] = {None: None if found is None else found[0]}
-        frames, finding = first.frames, ""
+        frames, finding = whole.frames, ""
     else:
-        own = MapFrame(id=first.frames.free_id(), map_id=second.map_id)
-        frames, ids = first.frames.added(own), {None: own.id}
+        own = MapFrame(id=whole.frames.free_id(), map_id=other.map_id)
+        frames, ids = whole.frames.added(own), {None: own.id}
         finding = (
             "The second memory is of another map, or nothing tells how it lies: it stays apart, "
             f"as the frame {own.id}."
@@ -70,10 +84,10 @@ def mount(first: MapDocument, second: MapDocument, *, paths: tuple[Path, Path]) 
                 f"The second memory's map lies turned by {math.degrees(found[1].yaw_rad):.1f} "
                 f"degrees, its origin at ({found[1].x:.2f}, {found[1].y:.2f}), as its walls tell."
             )
-    for frame in second.frames.items:
+    for frame in other.frames.items:
         ids[frame.id] = frames.free_id()
         frames = frames.added(MapFrame(id=frames.free_id()))
-    for frame in second.frames.items:
+    for frame in other.frames.items:
         frames = frames.changed(
             ids[frame.id] or "",
             map_id=frame.map_id,
@@ -116,36 +130,9 @@ def _find_motion(
     return None
 
 
-def _find_kept(document: MapDocument, path: Path) -> Iterator[tuple[FrameId, OccupancyGrid]]:
-    folder = WallFolder(path)
-    named = ((frame.id, frame.walls) for frame in document.frames.items)
-    for frame_id, name in ((None, document.find_entry(KEY) or OWN_WALLS), *named):
-        grid = None if name is None else folder.load(name)
+def _find_kept(store: MemoryStore) -> Iterator[tuple[FrameId, OccupancyGrid]]:
+    named = ((frame.id, frame.walls) for frame in store.read().frames.items)
+    for frame_id, name in ((None, store.read_entry(KEY) or OWN_WALLS), *named):
+        grid = None if name is None else store.walls.load(name)
         if grid is not None:
             yield frame_id, grid
-
-
-def renamed(document: MapDocument, ids: Mapping[FrameId, FrameId]) -> MapDocument:
-    """Return a memory whose records and events call their frames as the whole does."""
-    return replace(
-        document,
-        records={
-            key: replace(
-                record,
-                waypoint=replace(
-                    record.waypoint,
-                    frame=ids.get(record.waypoint.frame, record.waypoint.frame),
-                    map_id=None,
-                ),
-            )
-            for key, record in document.records.items()
-        },
-        events={
-            key: replace(
-                record,
-                event=replace(record.event, frame=ids.get(record.event.frame, record.event.frame)),
-            )
-            for key, record in document.events.items()
-        },
-        map_id=None,
-    )

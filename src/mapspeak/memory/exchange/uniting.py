@@ -1,5 +1,6 @@
 """Two memories of one map as one, and their files."""
 
+import shutil
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
@@ -8,20 +9,14 @@ from pathlib import Path
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.alignment.keeping import KEY
 from mapspeak.memory.episodes.store import BroughtOver, bring_over
-from mapspeak.memory.exchange.mounting import mount, renamed
+from mapspeak.memory.events import Event
+from mapspeak.memory.exchange.mounting import Mount, mount
 from mapspeak.memory.frames import Frames
 from mapspeak.memory.merging import merge_waypoint
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.durable import DurableFile
+from mapspeak.memory.store.durable import sync_folder
 from mapspeak.memory.store.memorystore import MemoryStore
-from mapspeak.memory.store.rewriting import (
-    with_entry,
-    with_event,
-    with_frames,
-    with_waypoints,
-)
-from mapspeak.memory.store.schema import record_data
+from mapspeak.memory.store.records import data_of
 from mapspeak.memory.store.semanticmap import SemanticMapStore
 from mapspeak.memory.walls import OWN_WALLS, WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
@@ -69,7 +64,7 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
         theirs = place if mine is None else _in_frame_of(mine, place, first.frames)
         if mine is None:
             places[key] = place
-        elif theirs is None or record_data(mine) != record_data(theirs):
+        elif theirs is None or data_of(mine) != data_of(theirs):
             joined, said = (None, APART) if theirs is None else _join(mine, theirs)
             if joined is None:
                 joined = _renamed(place, places, taken)
@@ -78,10 +73,10 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
             taken |= {name_key(joined.name)}
             findings.append(f"'{place.name}' is in both; {said}.")
     united = tuple(replace(place, map_id=map_id) for place in places.values())
-    before = {name_key(place.name): record_data(place) for place in first.waypoints}
+    before = {name_key(place.name): data_of(place) for place in first.waypoints}
     return Union(
         places=SemanticMap(map_id=map_id, waypoints=united),
-        changed=tuple(p for p in united if before.get(name_key(p.name)) != record_data(p)),
+        changed=tuple(p for p in united if before.get(name_key(p.name)) != data_of(p)),
         findings=tuple(findings),
     )
 
@@ -118,7 +113,7 @@ def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
     features = {name_key(text): text for text in newer.geometric_features}
     for text in older.geometric_features:
         features.setdefault(name_key(text), text)
-    is_same_pose = record_data(older)["pose"] == record_data(newer)["pose"]
+    is_same_pose = data_of(older)["pose"] == data_of(newer)["pose"]
     dated = newer if newer.recorded_at or newer.stamp_s is not None else older
     return replace(
         merge_waypoint(older, newer).waypoint,
@@ -133,7 +128,7 @@ def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
 
 def _unordered(place: Waypoint) -> dict[str, object]:
     """Return what a record says, whatever the order of its lists."""
-    said = record_data(place)
+    said = data_of(place)
     return {key: sorted(map(str, v)) if isinstance(v, list) else v for key, v in said.items()}
 
 
@@ -181,35 +176,44 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
     if out.exists():
         message = f"{out} is there already."
         raise SemanticMapError(message, hint="Name a file that is not, or remove it.")
-    document, other = _read(first), _read(second)
-    mounted = mount(document, other, paths=(first, second))
-    other = renamed(other, mounted.ids)
-    union = unite(replace(document.to_map(), frames=mounted.frames), other.to_map())
-    # All that the first file says besides places stays: comments, people's own keys.
-    whole = with_waypoints(with_frames(document, mounted.frames), union.changed)
-    for record in other.events.values():
-        nameless = replace(record.event, id="")
-        if nameless not in (replace(each.event, id="") for each in whole.events.values()):
-            whole, _ = with_event(whole, nameless)
-    # First, so that no file says what its observations lack.
-    came = bring_over(
-        first,
-        second,
-        to=out,
-        rename_map=lambda name: mounted.rename_map(name, whole_map_id=document.map_id),
-    )
-    for name, grid in mounted.walls.items():
-        WallFolder(out).keep(grid, name)
-    if whole.find_entry(KEY) is not None:
-        whole = with_entry(whole, KEY, OWN_WALLS)
-    SemanticMapStore(out).rewrite(lambda _: whole)
+    for path in (first, second):
+        if not path.exists():
+            message = f"There is no file {path}."
+            raise SemanticMapError(message, hint="Name a semantic map file, such as places.yaml.")
+    mine, theirs = SemanticMapStore(first), SemanticMapStore(second)
+    mounted = mount(mine, theirs)
+    union = unite(replace(mine.read(), frames=mounted.frames), mounted.rename_places(theirs.read()))
+    part = out.with_name(f"{out.stem}.part")
+    try:
+        # All that the first file says besides places stays: comments, people's own keys.
+        shutil.copyfile(first, part)
+        _fill(SemanticMapStore(part), union, mounted, theirs.read_events())
+        map_id = mine.read().map_id
+        came = bring_over(
+            first,
+            second,
+            to=out,
+            rename_map=lambda name: mounted.rename_map(name, whole_map_id=map_id),
+        )
+        for name, grid in mounted.walls.items():
+            WallFolder(out).keep(grid, name)
+        # Last, so that no file says what its observations lack.
+        part.replace(out)
+        sync_folder(out.parent)
+    finally:
+        for left in (part, part.with_name(f".{part.name}.lock")):
+            left.unlink(missing_ok=True)
     findings = tuple(filter(None, (mounted.finding, *union.findings)))
     return replace(union, findings=findings), came
 
 
-def _read(path: Path) -> MapDocument:
-    content, fingerprint = DurableFile(path, lock_timeout_s=0.0).read()
-    if fingerprint is None:
-        message = f"There is no file {path}."
-        raise SemanticMapError(message, hint="Name a semantic map file, such as places.yaml.")
-    return parse_document(content, source=str(path))
+def _fill(whole: SemanticMapStore, union: Union, mounted: Mount, events: Iterable[Event]) -> None:
+    """Write into a copy of the first memory what it lacks."""
+    whole.write_frames(lambda _: mounted.frames)
+    whole.write_all(lambda _: union.changed)
+    known = [replace(each, id="") for each in whole.read_events()]
+    for event in map(mounted.rename_event, events):
+        if event not in known:
+            whole.write_event(event)
+    if whole.read_entry(KEY) is not None:
+        whole.write_entry(KEY, OWN_WALLS)

@@ -6,43 +6,39 @@ that had not ended when it last asked. What is forgotten stays as a row that say
 something is written under its key again.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
 import psycopg
 from psycopg.types.json import Jsonb
-from pydantic import ValidationError
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
-from mapspeak.memory.frames import NO_FRAMES, Frames
-from mapspeak.memory.merging import Merge, merge_waypoint
+from mapspeak.memory.frames import NO_FRAMES, Frames, MapFrame
 from mapspeak.memory.postgres.database import Database
 from mapspeak.memory.postgres.walls import DatabaseWalls
-from mapspeak.memory.quoting import clean_line, name_key
-from mapspeak.memory.store.eventschema import event_data, event_from
-from mapspeak.memory.store.frameschema import frame_data, frame_from
-from mapspeak.memory.store.memorystore import (
-    WriteReceipt,
-    event_in_its_frame,
-    free_event_id,
-    in_its_frame,
-    require_same_map,
-)
-from mapspeak.memory.store.schema import record_data, waypoint_from
-from mapspeak.memory.store.tree import Data
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.store.records import data_of, key_of, list_key_of, read_record
+from mapspeak.memory.store.writing import OneRecord, Records, RecordStore, Result
+from mapspeak.memory.store.yamltext import Data
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 _PLACE, _EVENT, _FRAME, _ENTRY = "place", "event", "frame", "entry"
+_LISTS = {_PLACE: "waypoints", _EVENT: "events", _FRAME: "frames"}
+_KINDS = {list_key: kind for kind, list_key in _LISTS.items()}
 _MEMORY_LOCK, _NAME_LOCK = 0x6D61706D, 0x6D61706E
 _READ_NEWS = """
     SELECT pg_snapshot_xmin(pg_current_snapshot())::text, kind, key, position, changed::text, said
     FROM (VALUES (1)) AS always LEFT JOIN mapspeak.records ON changed >= %s::text::xid8
     ORDER BY kind = 'entry' DESC, position
 """
+_SELECT = """
+    SELECT kind, key, said FROM mapspeak.records
+    WHERE kind = ANY(%s) AND said IS NOT NULL ORDER BY position
+"""
+_SELECT_PLACE = "SELECT said FROM mapspeak.records WHERE kind = 'place' AND key = %s"
 _UPSERT = """
     INSERT INTO mapspeak.records AS known (kind, key, said) VALUES (%s, %s, %s)
     ON CONFLICT (kind, key) DO UPDATE SET
@@ -80,21 +76,16 @@ class _Known:
         )
 
 
-class PostgresStore:
-    """The memory of places in one PostgreSQL database; a `MemoryStore`.
+class PostgresStore(RecordStore):
+    """The memory of places in one PostgreSQL database.
 
     Args:
         address: As libpq takes it: "postgresql://user@host/database". Never shown.
-        path: What stands for the memory on this machine, beside which pictures and observations
-            lie.
-        map_id: The map that the robot is on. None takes the memory for what it says it is.
     """
 
     def __init__(self, address: str, *, path: Path, map_id: str | None = None) -> None:
-        self.path = path
-        self.map_id = clean_line(map_id or "") or None
         self._database = Database(address)
-        self.walls = DatabaseWalls(self._database)
+        super().__init__(path=path, walls=DatabaseWalls(self._database), map_id=map_id)
         self._known: _Known | None = None
         self._since = _FROM_THE_BEGINNING
         self._n_connected = 0
@@ -122,97 +113,31 @@ class PostgresStore:
         """Return what the memory says under a key of its own."""
         return cast("str | None", self._look().of(_ENTRY).get(key))
 
-    def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Create a waypoint, or change the record of that name."""
-        return self._write(waypoint, lambda _, placed: placed)
-
-    def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
-        """Write many waypoints in one transaction."""
-        with self._writing(alone=True) as rows:
-            waypoints = tuple(change(self._read_news(rows.connection).to_map()))
-            for map_id in dict.fromkeys(each.map_id for each in waypoints):
-                rows.bind(map_id)
-            rows.put_places(waypoints)
-
-    def write_event(self, event: Event) -> Event:
-        """Write an event, in its own record where its id is there already."""
-        with self._writing(alone=True) as rows:
-            events = rows.read_events()
-            placed = event_in_its_frame(event, events.get(event.id), rows.frames)
-            named = placed if placed.id else replace(placed, id=free_event_id(events))
-            if not event.frame:
-                rows.bind(self.map_id)
-            said = event_data(named)
-            rows.put(_EVENT, named.id, said)
-        return event_from(said)
-
-    def remember(
-        self, waypoint: Waypoint, *, gone: Iterable[str] = ()
-    ) -> tuple[WriteReceipt, Merge]:
-        """Join a waypoint with what is remembered under its name."""
-        labels = tuple(gone)
-        merges: list[Merge] = []
-
-        def join(before: Waypoint | None, placed: Waypoint) -> Waypoint:
-            merges.append(merge_waypoint(before, placed, gone=labels))
-            return merges[-1].waypoint
-
-        receipt = self._write(waypoint, join)
-        return receipt, merges[-1]
-
-    def remove(self, name: str) -> Waypoint | None:
-        """Forget a waypoint; its row stays, and says nothing."""
-        with self._writing() as rows:
-            known = rows.find_place(name_key(name))
-            if known is not None:
-                rows.put(_PLACE, name_key(name), None)
-        return known
-
-    def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
-        """Write what is known of frames; no record changes."""
-        with self._writing(alone=True) as rows:
-            changed = change(rows.frames)
-            for frame in changed.items:
-                if rows.frames.by_id.get(frame.id) != frame:
-                    rows.put(_FRAME, frame.id, cast("Data", frame_data(frame)))
-        return changed
-
     def close(self) -> None:
         """End the connection; the next call makes another."""
         self._database.close()
 
-    def _write(
-        self, waypoint: Waypoint, change: Callable[[Waypoint | None, Waypoint], Waypoint]
-    ) -> WriteReceipt:
-        require_same_map(waypoint, self.map_id)
-        map_id = None if waypoint.frame else self.map_id or waypoint.map_id
-        with self._writing(alone=map_id is not None and not self._is_bound) as rows:
-            rows.bind(map_id)
-            placed = in_its_frame(waypoint, find_known=rows.find_place, frames=rows.frames)
-            previous = rows.find_place(name_key(placed.name))
-            (said,) = rows.put_places([change(previous, placed)])
-        self._is_bound = rows.map_id is not None
-        return WriteReceipt(
-            waypoint=waypoint_from(said, map_id=rows.map_id),
-            previous=previous,
-        )
-
-    @contextmanager
-    def _writing(self, *, alone: bool = False) -> Iterator["_Rows"]:
-        """Give the rows in a transaction.
-
-        Args:
-            alone: No other writes meanwhile. Else none writes the places that are looked for.
-        """
-        taken = "pg_advisory_xact_lock" if alone else "pg_advisory_xact_lock_shared"
+    def _change(
+        self,
+        change: Callable[[Records], Result],
+        *,
+        alone: bool = False,
+        binding: str | None = None,
+    ) -> Result:
+        """Change rows in one transaction."""
+        is_alone = alone or (binding is not None and not self._is_bound)
+        lock = "pg_advisory_xact_lock" if is_alone else "pg_advisory_xact_lock_shared"
         # In a pipeline, what needs no answer does not wait for one.
         with (
             self._database.connected() as connection,
             connection.pipeline(),
             connection.transaction(),
         ):
-            connection.execute(f"SELECT {taken}(%s, 0)".encode(), (_MEMORY_LOCK,))
-            yield _Rows(connection)
+            connection.execute(f"SELECT {lock}(%s, 0)".encode(), (_MEMORY_LOCK,))
+            rows = _Rows(connection, read_all=self._read_news)
+            result = change(rows)
+        self._is_bound = rows.map_id is not None
+        return result
 
     def _look(self) -> _Known:
         """Return what the database says now."""
@@ -240,67 +165,72 @@ class PostgresStore:
 
 
 class _Rows:
-    """The rows, in a transaction that writes.
+    """The rows, in a transaction that writes; `Records`.
 
     Attributes:
         map_id: The map of the memory.
         frames: All of them.
     """
 
-    def __init__(self, connection: psycopg.Connection[Any]) -> None:
-        self.connection = connection
-        found = connection.execute(
-            "SELECT kind, key, said FROM mapspeak.records"
-            " WHERE kind IN ('entry', 'frame') AND said IS NOT NULL ORDER BY position"
-        ).fetchall()
+    def __init__(
+        self,
+        connection: psycopg.Connection[Any],
+        read_all: Callable[[psycopg.Connection[Any]], "_Known"],
+    ) -> None:
+        self._connection = connection
+        self._read_all = read_all
+        found = connection.execute(_SELECT, ([_ENTRY, _FRAME],)).fetchall()
         entries = {key: said for kind, key, said in found if kind == _ENTRY}
         self.map_id = cast("str | None", entries.get("map"))
-        frames = [
-            _read_record(_FRAME, key, said, None) for kind, key, said in found if kind == _FRAME
-        ]
-        self.frames = Frames(tuple(cast("list[Any]", frames))) if frames else NO_FRAMES
+        frames = [_read_row(_FRAME, key, said, None) for kind, key, said in found if kind == _FRAME]
+        self.frames = Frames(tuple(cast("list[MapFrame]", frames))) if frames else NO_FRAMES
         self._places: dict[str, Waypoint | None] = {}
+
+    def read(self) -> SemanticMap:
+        """Return all places."""
+        return self._read_all(self._connection).to_map()
+
+    def read_events(self) -> Mapping[str, Event]:
+        """Return all events by their ids."""
+        rows = self._connection.execute(_SELECT, ([_EVENT],)).fetchall()
+        return {key: cast("Event", _read_row(_EVENT, key, said, None)) for _, key, said in rows}
+
+    def find_place(self, key: str) -> Waypoint | None:
+        """Return what is remembered under a `name_key`; no one else writes it from now on."""
+        if key not in self._places:
+            self._connection.execute(
+                "SELECT pg_advisory_xact_lock(%s, hashtext(%s))", (_NAME_LOCK, key)
+            )
+            (said,) = self._connection.execute(_SELECT_PLACE, (key,)).fetchone() or (None,)
+            found = said and _read_row(_PLACE, key, said, self.map_id)
+            self._places[key] = cast("Waypoint | None", found)
+        return self._places[key]
 
     def bind(self, map_id: str | None) -> None:
         """Bind the memory to the map that its waypoints belong to, where it does not say one."""
         if map_id is not None and self.map_id is None:
-            self.put(_ENTRY, "map", map_id)
+            self._connection.execute(_UPSERT, (_ENTRY, "map", Jsonb(map_id)))
             self.map_id = map_id
 
-    def find_place(self, key: str) -> Waypoint | None:
-        """Return what is remembered under a `name_key`; nobody else writes it from now on."""
-        if key not in self._places:
-            self.connection.execute(
-                "SELECT pg_advisory_xact_lock(%s, hashtext(%s))", (_NAME_LOCK, key)
-            )
-            rows = self.connection.execute(
-                "SELECT said FROM mapspeak.records WHERE kind = 'place' AND key = %s", (key,)
-            )
-            (said,) = rows.fetchone() or (None,)
-            found = said and _read_record(_PLACE, key, said, self.map_id)
-            self._places[key] = cast("Waypoint | None", found)
-        return self._places[key]
+    def put(self, record: OneRecord) -> OneRecord:
+        """Write a record; return it as it reads."""
+        kind, key, data = _KINDS[list_key_of(record)], key_of(record), data_of(record)
+        self._connection.execute(_UPSERT, (kind, key, Jsonb(data)))
+        written = _read_row(kind, key, data, self.map_id)
+        if isinstance(written, MapFrame):
+            known = {**self.frames.by_id, written.id: written}
+            self.frames = Frames(tuple(known.values()))
+        return cast("OneRecord", written)
 
-    def read_events(self) -> dict[str, Event]:
-        rows = self.connection.execute(
-            "SELECT key, said FROM mapspeak.records WHERE kind = 'event' AND said IS NOT NULL"
-            " ORDER BY position"
-        )
-        events = {key: _read_record(_EVENT, key, said, None) for key, said in rows.fetchall()}
-        return cast("dict[str, Event]", events)
+    def put_places(self, waypoints: Iterable[Waypoint]) -> None:
+        """Write many places."""
+        rows = [(_PLACE, name_key(each.name), Jsonb(data_of(each))) for each in waypoints]
+        with self._connection.cursor() as cursor:
+            cursor.executemany(_UPSERT, rows)
 
-    def put(self, kind: str, key: str, said: Data) -> None:
-        """Write one record; None forgets it."""
-        self.connection.execute(_UPSERT, (kind, key, None if said is None else Jsonb(said)))
-
-    def put_places(self, waypoints: Iterable[Waypoint]) -> list[Data]:
-        """Write places, and return what their rows say."""
-        said = {name_key(each.name): cast("Data", record_data(each)) for each in waypoints}
-        with self.connection.cursor() as cursor:
-            cursor.executemany(
-                _UPSERT, [(_PLACE, key, Jsonb(record)) for key, record in said.items()]
-            )
-        return list(said.values())
+    def remove(self, key: str) -> None:
+        """Forget the place with a `name_key`; its row stays, and says nothing."""
+        self._connection.execute(_UPSERT, (_PLACE, key, None))
 
 
 def _with_news(known: _Known, news: Sequence[tuple[str, str, int, str, Data]]) -> _Known:
@@ -313,7 +243,7 @@ def _with_news(known: _Known, news: Sequence[tuple[str, str, int, str, Data]]) -
             records[kind].pop(key, None)
             continue
         try:
-            records[kind][key] = _read_record(kind, key, said, records[_ENTRY].get("map"))
+            records[kind][key] = _read_row(kind, key, said, records[_ENTRY].get("map"))
         except SemanticMapError as fault:
             faults[kind, key] = fault
     map_id = records[_ENTRY].get("map")
@@ -332,17 +262,13 @@ def _with_news(known: _Known, news: Sequence[tuple[str, str, int, str, Data]]) -
     return _Known(rows=rows, records=records, faults=faults)
 
 
-def _read_record(kind: str, key: str, said: Data, map_id: str | None) -> object:
-    readers: dict[str, Callable[[Data], object]] = {
-        _PLACE: lambda data: waypoint_from(data, map_id=map_id),
-        _EVENT: event_from,
-        _FRAME: frame_from,
-        _ENTRY: str,
-    }
+def _read_row(kind: str, key: str, said: Data, map_id: str | None) -> object:
+    if kind == _ENTRY:
+        return str(said)
     try:
-        return readers[kind](said)
-    except ValidationError as error:
+        return read_record(_LISTS[kind], said, map_id)
+    except SemanticMapError as error:
         raise SemanticMapError(
-            f"The row {kind} {key!r} of the memory is none: {error.errors()[0]['msg']}.",
+            f"The row {kind} {key!r} of the memory is none: {error.message}",
             hint="Mend it in the table mapspeak.records, or remove it.",
         ) from None

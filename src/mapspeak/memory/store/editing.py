@@ -1,236 +1,124 @@
-"""Change one record in its own text: what stays the same keeps its spelling and its comments."""
+"""Change one record in its own text: what says the same keeps its lines, its comments all stay."""
 
-import json
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
-from mapspeak.memory.store.tree import (
-    Data,
-    ListNode,
-    MappingNode,
-    Node,
-    comments_between,
-    comments_in,
-    comments_within,
-    parse_tree,
-    without_comments,
-)
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-MAX_COLUMNS = 100
-"""A list that would be wider stands with one item a line."""
-
-_BARE_KEYS = frozenset(
-    {"x", "y", "yaw_deg", "bearing_deg", "range_m", "stamp_s", "recorded_at", "from", "until"}
-)
-"""Their values are numbers or times, and stand without quotes."""
-
-_OTHER_MEANING = frozenset({"true", "false", "yes", "no", "on", "off", "null", "y", "n"})
-_SPECIAL_IN_BLOCK = re.compile(r":(?= |$)| #")
-_SPECIAL_IN_FLOW = re.compile(r"[,\[\]{}:#?]")
+from mapspeak.memory.store.cutting import split_end
+from mapspeak.memory.store.yamltext import Data, compose, data_of, find_comments
+from mapspeak.memory.store.yamlwriting import entry_text, flow_text, line_text
 
 
-def is_plain(text: str) -> bool:
-    """Return True when every YAML reader takes the unquoted text, on its own line, as it is."""
-    return (
-        text[:1].isalpha()
-        and text.isprintable()
-        and not text.endswith(" ")
-        and not _SPECIAL_IN_BLOCK.search(text)
-        and text.casefold() not in _OTHER_MEANING
-    )
+def edited_item(text: str, *, indent: int, old: dict[str, Data], new: dict[str, Data]) -> str:
+    """Return the text of one item of a list, changed from one saying to another.
+
+    A key or an item of a list within it that says something else is written anew, with the comments
+    that it had behind it. People's own keys stay.
+    """
+    body, rest = split_end(text, indent)
+    listed = compose(body)
+    node = listed.value[0] if isinstance(listed, SequenceNode) else None
+    if not isinstance(node, MappingNode):
+        return text
+    if not node.flow_style:
+        return "".join(_edited_lines(body, node, old, new)) + rest
+    line = flow_text(merged_data(data_of(node), old, new))
+    comments = find_comments(body, [node], 0, len(body))
+    return " " * indent + "  ".join([f"- {line}", *comments]) + "\n" + rest
 
 
-def is_plain_in_flow(text: str) -> bool:
-    """Return True when every YAML reader takes the unquoted text, within brackets, for itself."""
-    return is_plain(text) and not _SPECIAL_IN_FLOW.search(text)
+def _edited_lines(
+    text: str, node: MappingNode, old: dict[str, Data], new: dict[str, Data]
+) -> Iterator[str]:
+    """Return the stretches of an item's text, one for each key."""
+    text = text if text.endswith("\n") else text + "\n"
+    column = node.start_mark.column
+    starts = [0, *(_line_start(text, key) for key, _ in node.value[1:]), len(text)]
+    said = data_of(node)
+    assert isinstance(said, dict)  # noqa: S101 - a mapping says one
+    for (key, value), start, end in zip(node.value, starts[:-1], starts[1:], strict=True):
+        name = key.value
+        if new.get(name) == old.get(name):
+            yield text[start:end]
+            continue
+        edited = _edited_list(text, value, end, old.get(name), new.get(name))
+        if edited is not None:
+            yield text[start : _line_start(text, value.value[0])] + edited
+            continue
+        stretch, below = split_end(text[start:end], column)
+        found = find_comments(text, [key, value], start, start + len(stretch))
+        merged = merged_data(said[name], old.get(name), new.get(name))
+        yield text[start : key.start_mark.index]
+        yield entry_text(name, merged, indent=column, comments="  ".join(found)) + "\n" + below
+    for name, data in new.items():
+        if name not in said and data:
+            yield " " * column + entry_text(name, data, indent=column) + "\n"
 
 
-def flow_text(data: Data, key: str = "") -> str:
-    """Return a value on one line; the key it stands under says whether it is a number."""
-    if data is None:
-        return "null"
-    if isinstance(data, str):
-        # JSON's quotes are YAML's, except for characters that it would write as surrogate pairs.
-        is_bare = key in _BARE_KEYS or is_plain_in_flow(data)
-        return data if is_bare else json.dumps(data, ensure_ascii=False)
-    if isinstance(data, list):
-        return f"[{', '.join(flow_text(item) for item in data)}]"
-    entries = (f"{name}: {flow_text(value, name)}" for name, value in data.items())
-    return f"{{{', '.join(entries)}}}"
+def _edited_list(text: str, node: Node, end: int, old: Data, new: Data) -> str | None:
+    """Return the lines of a list with a dash a line; None where it is not laid out so."""
+    is_listed = isinstance(node, SequenceNode) and not node.flow_style and node.value
+    if not is_listed or not isinstance(new, list) or not isinstance(old, list) or not new:
+        return None
+    if len(old) != len(node.value):
+        return None
+    starts = [_line_start(text, item) for item in node.value]
+    if any(
+        text[start : item.start_mark.index].strip() != "-"
+        for start, item in zip(starts, node.value, strict=True)
+    ):
+        return None
+    margin = text[starts[0] : node.value[0].start_mark.index].partition("-")[0]
+    spans = list(zip(starts, [*starts[1:], end], strict=True))
+    sources, gone = _find_sources(old, new)
+    lines = []
+    for item, source in zip(new, sources, strict=True):
+        if source is not None and old[source] == item:
+            lines.append(text[slice(*spans[source])])
+            continue
+        data, comments = item, list[str]()
+        if source is not None:
+            data = merged_data(data_of(node.value[source]), old[source], item)
+            comments = find_comments(text, [node.value[source]], *spans[source])
+        lines.append("  ".join([f"{margin}- {line_text(data)}", *comments]) + "\n")
+    left = (find_comments(text, [node.value[i]], *spans[i]) for i in gone)
+    return "".join([*lines, *(f"{margin}{each}\n" for comments in left for each in comments)])
 
 
-def line_text(data: Data, key: str = "") -> str:
-    """Return a value that ends its line, outside of brackets."""
-    if isinstance(data, str) and is_plain(data):
-        return data
-    return flow_text(data, key)
+def _line_start(text: str, node: Node) -> int:
+    return text.rfind("\n", 0, node.start_mark.index) + 1
 
 
-def entry_text(key: str, data: Data, *, indent: int) -> str:
-    """Return `key: value` without the first line's indentation, over several lines where needed."""
-    below = "\n" + " " * (indent + 2)
-    if isinstance(data, str) and "\n" in data:
-        lines = (below + line if line else "\n" for line in data.split("\n"))
-        return f"{key}: |-{''.join(lines)}"
-    if isinstance(data, list):
-        has_mapping = any(isinstance(item, dict) for item in data)
-        if has_mapping or len(key) + indent + len(flow_text(data)) > MAX_COLUMNS:
-            return f"{key}:" + "".join(f"{below}- {line_text(item)}" for item in data)
-    return f"{key}: {line_text(data, key)}"
+def merged_data(said: Data, old: Data, new: Data) -> Data:
+    """Return what is to be said: as it is spelt where nothing changed, with people's own keys.
+
+    Args:
+        said: What stands there.
+        old: How mapspeak would have said that.
+        new: How it says what is to stand there.
+    """
+    if old == new:
+        return said
+    if isinstance(said, dict) and not isinstance(new, list | None):
+        old, new = _as_mapping(old), _as_mapping(new)
+        kept = {
+            key: merged_data(value, old.get(key), new[key]) if key in new else value
+            for key, value in said.items()
+            if key in new or key not in old
+        }
+        return kept | {key: value for key, value in new.items() if value and key not in said}
+    if not isinstance(said, list) or not isinstance(old, list) or not isinstance(new, list):
+        return new
+    if len(said) != len(old):
+        return new
+    sources, _ = _find_sources(old, new)
+    return [
+        item if source is None else merged_data(said[source], old[source], item)
+        for item, source in zip(new, sources, strict=True)
+    ]
 
 
-def record_text(data: dict[str, Data], *, indent: int) -> str:
-    """Return one waypoint as an item of the list `waypoints`, with its final line break."""
-    margin = " " * (indent + 2)
-    entries = [entry_text(key, value, indent=indent + 2) for key, value in data.items()]
-    return " " * indent + "- " + f"\n{margin}".join(entries) + "\n"
-
-
-_Edit = tuple[int, int, str]
-"""From where to where the text gives way, and what it gives way to."""
-
-
-def edited_record(block: str, *, old: dict[str, Data], new: dict[str, Data]) -> str:
-    """Return the text of one item of `waypoints`, changed from one saying to another."""
-    tree = parse_tree(block)
-    record = tree.items[0] if isinstance(tree, ListNode) else tree
-    if not isinstance(record, MappingNode):
-        return block
-    editor = _Editor(block)
-    return editor.applied(editor.mapping_edits(record, old, new), 0, len(block))
-
-
-class _Editor:
-    """Plans the edits of one text."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-
-    def applied(self, edits: Iterable[_Edit], start: int, end: int) -> str:
-        """Return a stretch of the text with the edits that lie in it made."""
-        pieces = []
-        for begin, stop, new in sorted(edits, key=lambda edit: edit[:2]):
-            pieces += [self._text[start:begin], new]
-            start = stop
-        return "".join([*pieces, self._text[start:end]])
-
-    # --- mappings ----------------------------------------------------------------------------
-
-    def mapping_edits(
-        self, node: MappingNode, old: dict[str, Data], new: dict[str, Data]
-    ) -> Iterator[_Edit]:
-        """Return the edits that make a mapping say what is new; unknown keys stay."""
-        added: dict[str, Data] = {}
-        for key in dict.fromkeys((*old, *new)):
-            before, after, place = old.get(key), new.get(key), node.find_value(key)
-            if before == after:
-                continue
-            if place is None:
-                added |= {key: after} if after else {}
-            elif isinstance(place, MappingNode) and isinstance(after, dict):
-                yield from self.mapping_edits(place, _as_mapping(before), after)
-            elif isinstance(place, ListNode) and isinstance(after, list):
-                yield self._list_edit(place, list(before or ()), after)
-            else:
-                yield self._scalar_edit(node, place, key, after)
-        if added:
-            yield self._insertion(node, added)
-
-    def _insertion(self, node: MappingNode, added: dict[str, Data]) -> _Edit:
-        last = node.entries[-1][1].end
-        if node.is_flow:
-            entries = (f", {key}: {flow_text(value, key)}" for key, value in added.items())
-            return (last, last, "".join(entries))
-        column, end = self._column(node.start), self._line_end(last)
-        margin = "\n" + " " * column
-        lines = (margin + entry_text(key, value, indent=column) for key, value in added.items())
-        return (end, end, "".join(lines))
-
-    def _scalar_edit(self, parent: MappingNode, node: Node, key: str, new: Data) -> _Edit:
-        if parent.is_flow:
-            return self._one_line_edit(node, flow_text(new, key))
-        if self._rest_of_line(node) or comments_within(self._text, node):
-            return self._one_line_edit(node, line_text(new, key))
-        entry = entry_text(key, new, indent=self._column(parent.start))
-        value = entry.removeprefix(f"{key}:")
-        return (node.start, node.end, value if node.start == node.end else value.lstrip(" "))
-
-    def _one_line_edit(self, node: Node, value: str) -> _Edit:
-        space = " " if self._text[node.start - 1 : node.start] == ":" else ""
-        comments = comments_within(self._text, node)
-        return (node.start, node.end, space + value + self._behind(node, comments))
-
-    # --- lists -------------------------------------------------------------------------------
-
-    def _list_edit(self, node: ListNode, old: list[Data], new: list[Data]) -> _Edit:
-        if not node.items:
-            return self._one_line_edit(node, flow_text(new))
-        return (self._flow_list_edit if node.is_flow else self._block_list_edit)(node, old, new)
-
-    def _flow_list_edit(self, node: ListNode, old: list[Data], new: list[Data]) -> _Edit:
-        sources, gone = _sources(old, new)
-        spans = [(item.start, item.end) for item in node.items]
-        pieces = [
-            flow_text(item) if i is None else self._continued(node.items[i], spans[i], old[i], item)
-            for item, i in zip(new, sources, strict=True)
-        ]
-        comments = comments_between(self._text, node.start, node.end, node.items)
-        comments += [c for i in gone for c in comments_within(self._text, node.items[i])]
-        value = f"[{', '.join(pieces)}]"
-        return (node.start, node.end, value + self._behind(node, comments))
-
-    def _block_list_edit(self, node: ListNode, old: list[Data], new: list[Data]) -> _Edit:
-        sources, gone = _sources(old, new)
-        dashes = list(self._dashes(node))
-        spans = list(zip(dashes, [*dashes[1:], self._line_end(node.end)], strict=True))
-        lines = [
-            f"- {line_text(item)}"
-            if i is None
-            else self._continued(node.items[i], spans[i], old[i], item)
-            for item, i in zip(new, sources, strict=True)
-        ]
-        comments = [c for i in gone for c in comments_in(self._text, *spans[i], [node.items[i]])]
-        margin = "\n" + " " * self._column(dashes[0])
-        value = margin.join([*(lines or ["  []"]), *comments])
-        return (dashes[0], spans[-1][1], value)
-
-    def _continued(self, node: Node, span: tuple[int, int], old: Data, new: Data) -> str:
-        edits: Iterable[_Edit] = ()
-        if isinstance(node, MappingNode):
-            edits = self.mapping_edits(node, _as_mapping(old), _as_mapping(new))
-        elif old != new:
-            edits = [(node.start, node.end, flow_text(new))]
-        return self.applied(edits, *span).rstrip()
-
-    def _dashes(self, node: ListNode) -> Iterator[int]:
-        end = node.start
-        for item in node.items:
-            # A comment may hold a dash, too.
-            yield end + without_comments(self._text[end : item.start]).index("-")
-            end = item.end
-
-    # --- places ------------------------------------------------------------------------------
-
-    def _behind(self, node: Node, comments: list[str]) -> str:
-        """Return comments to stand behind a value, and a new line if more than comments follows."""
-        if not comments:
-            return ""
-        is_followed = self._rest_of_line(node)[:1] not in ("", "#")
-        line_break = "\n" + " " * self._column(node.start) if is_followed else ""
-        return f"  {'  '.join(comments)}{line_break}"
-
-    def _rest_of_line(self, node: Node) -> str:
-        return self._text[node.end : self._line_end(node.end)].strip()
-
-    def _column(self, offset: int) -> int:
-        return offset - (self._text.rfind("\n", 0, offset) + 1)
-
-    def _line_end(self, offset: int) -> int:
-        end = self._text.find("\n", offset)
-        return len(self._text) if end < 0 else end
-
-
-def _sources(old: list[Data], new: list[Data]) -> tuple[list[int | None], list[int]]:
+def _find_sources(old: list[Data], new: list[Data]) -> tuple[list[int | None], list[int]]:
     """Find which old item each new one continues, and the old ones that none continues.
 
     An item continues one that says the same, or else one with the same label.
@@ -242,7 +130,7 @@ def _sources(old: list[Data], new: list[Data]) -> tuple[list[int | None], list[i
             if sources[index] is None:
                 like = (i for i, other in left.items() if likeness(other) == likeness(item))
                 sources[index] = next(like, None)
-                left = {i: other for i, other in left.items() if i != sources[index]}
+                left.pop(sources[index], None)  # type: ignore[arg-type]  # None is no index
     return sources, list(left)
 
 
@@ -251,4 +139,4 @@ def _as_mapping(item: Data) -> dict[str, Data]:
 
 
 def _label(item: Data) -> Data:
-    return _as_mapping(item)["label"]
+    return _as_mapping(item).get("label")

@@ -1,6 +1,6 @@
 """Forgetting places and things, so that it can be undone."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
 from mapspeak.memory.quoting import name_key
@@ -9,6 +9,9 @@ from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 
 Seen = tuple[str, str, float | None, float | None]
 """One view of a thing: the `name_key` of the place, label, bearing and range."""
+
+_Test = Callable[[Waypoint, Landmark | None], bool]
+"""Tells whether a place, or one of its landmarks, is meant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,91 +36,71 @@ def view_of(waypoint: str, landmark: Landmark) -> Seen:
 
 def forget_place(store: MemoryStore, name: str) -> Forgotten:
     """Forget a place with all that was seen from there."""
-    return _change(store, lambda place: name_key(place.name) == name_key(name), _keep, is_gone=True)
+    key = name_key(name)
+    return _mark(store, lambda place, each: each is None and name_key(place.name) == key)
 
 
 def forget_views(store: MemoryStore, views: Collection[Seen]) -> Forgotten:
     """Forget landmarks: all views of a thing, whatever records have them."""
-    return _change(
-        store, _no_place, lambda place, each: view_of(place.name, each) in views, is_gone=True
-    )
+    return _mark(store, lambda place, each: each is not None and view_of(place.name, each) in views)
 
 
 def forget_label(store: MemoryStore, label: str) -> Forgotten:
     """Forget every landmark of a label, wherever it was seen."""
     key = name_key(label)
-    return _change(store, _no_place, lambda _, each: name_key(each.label) == key, is_gone=True)
+    return _mark(store, lambda _, each: each is not None and name_key(each.label) == key)
 
 
 def restore(store: MemoryStore, name: str) -> Forgotten:
     """Remember again what was forgotten under a name: a place, or landmarks of that label."""
     key = name_key(name)
-    return _change(
+    return _mark(
         store,
-        lambda place: name_key(place.name) == key,
-        lambda _, each: name_key(each.label) == key,
+        lambda place, each: name_key(place.name if each is None else each.label) == key,
         is_gone=False,
     )
 
 
-def _keep(_: Waypoint, __: Landmark) -> bool:
-    return False
-
-
-def _no_place(_: Waypoint) -> bool:
-    return False
-
-
-def _change(
-    store: MemoryStore,
-    is_place: Callable[[Waypoint], bool],
-    is_landmark: Callable[[Waypoint, Landmark], bool],
-    *,
-    is_gone: bool,
-) -> Forgotten:
+def _mark(store: MemoryStore, is_meant: _Test, *, is_gone: bool = True) -> Forgotten:
+    """Mark what is meant as gone or not, all of it or nothing."""
     done: list[Forgotten] = []
 
     def change(known: SemanticMap) -> Iterable[Waypoint]:
-        changed = [
-            (place, _changed(place, is_place, is_landmark, is_gone=is_gone))
-            for place in known.waypoints
-        ]
-        done.append(_tell(changed))
-        return [after for before, after in changed if after != before]
+        changed = [(each, _marked(each, is_meant, is_gone=is_gone)) for each in known.waypoints]
+        n_landmarks = {
+            after.name: sum(
+                one.is_gone != other.is_gone
+                for one, other in zip(before.landmarks, after.landmarks, strict=True)
+            )
+            for before, after in changed
+        }
+        done.append(
+            Forgotten(
+                places=tuple(b.name for b, after in changed if b.is_gone != after.is_gone),
+                seen_from=tuple(name for name, n in n_landmarks.items() if n),
+                n_landmarks=sum(n_landmarks.values()),
+            )
+        )
+        return [after for before, after in changed if after is not before]
 
     store.write_all(change)
     return done[-1]
 
 
-def _changed(
-    place: Waypoint,
-    is_place: Callable[[Waypoint], bool],
-    is_landmark: Callable[[Waypoint, Landmark], bool],
-    *,
-    is_gone: bool,
-) -> Waypoint:
-    def marked(landmarks: Iterable[Landmark]) -> Iterator[Landmark]:
-        for each in landmarks:
-            yield replace(each, is_gone=is_gone) if is_landmark(place, each) else each
+def _marked(place: Waypoint, is_meant: _Test, *, is_gone: bool) -> Waypoint:
+    def is_to_change(each: Landmark) -> bool:
+        return each.is_gone != is_gone and is_meant(place, each)
 
+    is_place = place.is_gone != is_gone and is_meant(place, None)
+    if not is_place and not any(map(is_to_change, place.landmarks)):
+        return place
+    safety, functional = (
+        tuple(replace(each, is_gone=is_gone) if is_to_change(each) else each for each in landmarks)
+        for landmarks in (place.safety_landmarks, place.functional_landmarks)
+    )
     return replace(
         place,
-        is_gone=is_gone if is_place(place) else place.is_gone,
-        safety_landmarks=tuple(marked(place.safety_landmarks)),
-        functional_landmarks=tuple(marked(place.functional_landmarks)),
+        is_gone=is_gone if is_place else place.is_gone,
+        safety_landmarks=safety,
+        functional_landmarks=functional,
     )
-
-
-def _tell(changed: Iterable[tuple[Waypoint, Waypoint]]) -> Forgotten:
-    places, seen_from, n_landmarks = [], [], 0
-    for before, after in changed:
-        if before.is_gone != after.is_gone:
-            places.append(after.name)
-        n_here = sum(
-            one.is_gone != other.is_gone
-            for one, other in zip(before.landmarks, after.landmarks, strict=True)
-        )
-        if n_here:
-            seen_from.append(after.name)
-            n_landmarks += n_here
-    return Forgotten(places=tuple(places), seen_from=tuple(seen_from), n_landmarks=n_landmarks)

@@ -1,16 +1,13 @@
 """What every memory of places promises, wherever it keeps them."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from itertools import count
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames
 from mapspeak.memory.merging import Merge
-from mapspeak.memory.quoting import name_key, quote_name
 from mapspeak.memory.walls import KeptWalls
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
@@ -98,63 +95,3 @@ class MemoryStore(Protocol):
         Args:
             change: Tells how they read, from how they do; called once or more often.
         """
-
-
-def in_its_frame(
-    waypoint: Waypoint, *, find_known: Callable[[str], Waypoint | None], frames: Frames
-) -> Waypoint:
-    """Return a waypoint as a memory keeps it: in the frame and under the name of its record.
-
-    A record of its name in a frame of which it is not known how it lies is another place: the
-    waypoint gets a number behind its name.
-
-    Args:
-        find_known: Finds what is remembered under a `name_key`.
-    """
-    for number in count(1):
-        name = waypoint.name if number == 1 else f"{waypoint.name} ({number})"
-        known = find_known(name_key(name))
-        if known is None:
-            return replace(waypoint, name=name)
-        motion = frames.find_transform(of=waypoint.frame, into=known.frame)
-        if motion is not None:
-            is_moved = known.frame != waypoint.frame
-            placed = waypoint.moved(motion) if is_moved else waypoint
-            return replace(placed, name=name, frame=known.frame, room_id=waypoint.room_id)
-    raise AssertionError  # Numbers do not end.
-
-
-def event_in_its_frame(event: Event, known: Event | None, frames: Frames) -> Event:
-    """Return an event as a memory keeps it: in the frame of what is known under its id.
-
-    Raises:
-        SemanticMapError: It is not known how the event's frame lies to that.
-    """
-    if known is None or known.frame == event.frame:
-        return event
-    motion = frames.find_transform(of=event.frame, into=known.frame)
-    if motion is None:
-        raise SemanticMapError(
-            f"The event {event.id} is of another map.", hint="Note another one for this map."
-        )
-    return replace(event.moved(motion), frame=known.frame)
-
-
-def free_event_id(known_ids: Iterable[str]) -> str:
-    """Return an id that no event has had: E1, E2, ..."""
-    numbers = [int(each[1:]) for each in known_ids if each[:1] == "E" and each[1:].isdigit()]
-    return f"E{max(numbers, default=0) + 1}"
-
-
-def require_same_map(waypoint: Waypoint, map_id: str | None) -> None:
-    """Refuse a waypoint that is of another map than the robot.
-
-    Raises:
-        SemanticMapError: It is.
-    """
-    if None not in (waypoint.map_id, map_id) and waypoint.map_id != map_id:
-        raise SemanticMapError(
-            f"The waypoint {quote_name(waypoint.name)} belongs to the map "
-            f"{quote_name(waypoint.map_id or '')}, but the robot is on {quote_name(map_id or '')}.",
-            hint="Write it where the robot is on that map.",
-        )

@@ -4,32 +4,18 @@ Reading and writing are synchronous and safe between processes and threads: a st
 but what it read last.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
+from typing import cast
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames
-from mapspeak.memory.merging import Merge, merge_waypoint
-from mapspeak.memory.quoting import clean_line, name_key
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile, Fingerprint
-from mapspeak.memory.store.memorystore import (
-    WriteReceipt,
-    event_in_its_frame,
-    in_its_frame,
-    require_same_map,
-)
-from mapspeak.memory.store.rewriting import (
-    bound_to,
-    with_event,
-    with_frames,
-    with_waypoint,
-    with_waypoints,
-    without_waypoint,
-)
+from mapspeak.memory.store.records import key_of, list_key_of
+from mapspeak.memory.store.writing import OneRecord, Records, RecordStore, Result
 from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
@@ -48,7 +34,7 @@ class _Seen:
     fault: SemanticMapError | None
 
 
-class SemanticMapStore:
+class SemanticMapStore(RecordStore):
     """The semantic map in one YAML file.
 
     Args:
@@ -59,9 +45,7 @@ class SemanticMapStore:
     def __init__(
         self, path: Path, *, map_id: str | None = None, lock_timeout_s: float = LOCK_TIMEOUT_S
     ) -> None:
-        self.path = path
-        self.walls = WallFolder(path)
-        self.map_id = clean_line(map_id or "") or None
+        super().__init__(path=path, walls=WallFolder(path), map_id=map_id)
         self._file = DurableFile(path, lock_timeout_s=lock_timeout_s)
         self._seen: _Seen | None = None
 
@@ -71,116 +55,61 @@ class SemanticMapStore:
         A file that was broken by hand since gives the places read before, with a warning.
         """
         seen = self._look()
-        if seen.document is None:
-            raise _raised_again(seen.fault)
-        places = seen.document.to_map()
-        return replace(places, warnings=(*places.warnings, *self._warnings(seen)))
+        places = self._document(seen).places
+        if seen.fault is None:
+            return places
+        warning = f"{seen.fault} Until then, the waypoints read before are given."
+        return replace(places, warnings=(*places.warnings, warning))
 
     def read_events(self) -> tuple[Event, ...]:
         """Return all events of the file, also those that are over."""
-        return tuple(record.event for record in self._document().events.values())
+        return cast("tuple[Event, ...]", self._document(self._look()).records_of("events"))
 
     def read_entry(self, key: str) -> str | None:
         """Return what the file says under a key of its own."""
-        return self._document().find_entry(key)
+        return self._document(self._look()).find_entry(key)
 
-    def write_event(self, event: Event) -> Event:
-        """Write an event, in its own record where its id is there already."""
+    def write_entry(self, key: str, value: str) -> None:
+        """Write what the file says under a key of its own."""
+        self._rewrite(lambda records: records.write_entry(key, value))
 
-        def write(document: MapDocument) -> MapDocument:
-            bound = document if event.frame else bound_to(document, self.map_id)
-            return with_event(bound, _event_in_its_frame(document, event))[0]
+    def _change(
+        self,
+        change: Callable[[Records], Result],
+        *,
+        alone: bool = False,  # noqa: ARG002 - every writer of a file is alone
+        binding: str | None = None,  # noqa: ARG002 - likewise
+    ) -> Result:
+        """Replace the file by a changed one, whoever else writes meanwhile."""
+        return self._rewrite(change)
 
-        _, after = self.rewrite(write)
-        ids = [event.id] if event.id else list(after.events)[-1:]
-        return after.events[ids[0]].event
-
-    def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Create a waypoint, or change the record of that name."""
-        return self._write(waypoint, lambda _, placed: placed)
-
-    def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
-        """Write many waypoints, all or none; into the file of whichever map they are of."""
-        self.rewrite(lambda document: with_waypoints(document, change(document.to_map())))
-
-    def remember(
-        self, waypoint: Waypoint, *, gone: Iterable[str] = ()
-    ) -> tuple[WriteReceipt, Merge]:
-        """Join a waypoint with what is remembered under its name."""
-        labels = tuple(gone)
-        merges: list[Merge] = []
-
-        def join(before: Waypoint | None, placed: Waypoint) -> Waypoint:
-            merges.append(merge_waypoint(before, placed, gone=labels))
-            return merges[-1].waypoint
-
-        receipt = self._write(waypoint, join)
-        return receipt, merges[-1]
-
-    def remove(self, name: str) -> Waypoint | None:
-        """Take a record out of the file, with the comments in it."""
-        key = name_key(name)
-        if key not in self._document().records:
-            return None
-        before, _ = self.rewrite(lambda document: without_waypoint(document, key))
-        return _known(before, key)
-
-    def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
-        """Write what is known of frames; no record changes."""
-        _, after = self.rewrite(lambda document: with_frames(document, change(document.frames)))
-        return after.frames
-
-    def _write(
-        self, waypoint: Waypoint, change: Callable[[Waypoint | None, Waypoint], Waypoint]
-    ) -> WriteReceipt:
-        map_id = self.map_id or waypoint.map_id
-        require_same_map(waypoint, self.map_id)
-        keys: list[str] = []
-
-        def write(document: MapDocument) -> MapDocument:
-            find = partial(_known, document)
-            placed = in_its_frame(waypoint, find_known=find, frames=document.frames)
-            keys.append(name_key(placed.name))
-            bound = document if waypoint.frame else bound_to(document, map_id)
-            return with_waypoint(bound, change(_known(document, keys[-1]), placed))
-
-        before, after = self.rewrite(write)
-        return WriteReceipt(
-            waypoint=after.records[keys[-1]].waypoint,
-            previous=_known(before, keys[-1]),
-        )
-
-    def _document(self) -> MapDocument:
-        seen = self._look()
-        if seen.document is None:
-            raise _raised_again(seen.fault)
-        return seen.document
-
-    def rewrite(
-        self, change: Callable[[MapDocument], MapDocument]
-    ) -> tuple[MapDocument, MapDocument]:
-        """Replace the file by a changed one and return both, whoever else writes meanwhile.
-
-        Args:
-            change: Called with the file as it is, once or more often; whichever map it belongs to.
-
-        Raises:
-            SemanticMapError: The file has a fault, cannot be written, or is held by another
-                program. Nothing was changed.
-        """
+    def _rewrite(self, change: "Callable[[_FileRecords], Result]") -> Result:
         self._look()  # Others do not wait while this reads what it never read before.
         with self._file.locked():
             for _ in range(_N_TRIES):
                 seen = self._look()
-                if seen.document is None or seen.fault is not None:
+                if seen.fault is not None:
                     raise _raised_again(seen.fault)
-                after = change(seen.document)
-                fingerprint = self._file.replace(after.content, expected=seen.fingerprint)
+                before = self._document(seen)
+                records = _FileRecords(before)
+                result = change(records)
+                if records.document is before:
+                    return result
+                content = records.document.content
+                fingerprint = self._file.replace(content, expected=seen.fingerprint)
                 if fingerprint is not None:
-                    self._seen = _Seen(fingerprint=fingerprint, document=after, fault=None)
-                    return seen.document, after
+                    self._seen = _Seen(
+                        fingerprint=fingerprint, document=records.document, fault=None
+                    )
+                    return result
         message = f"Another program changes {self.path} all the time; nothing was written."
         raise SemanticMapError(message, hint="End that program, then write again.")
+
+    @staticmethod
+    def _document(seen: _Seen) -> MapDocument:
+        if seen.document is None:
+            raise _raised_again(seen.fault)
+        return seen.document
 
     def _look(self) -> _Seen:
         """Return what the file says now, reading only what changed."""
@@ -201,19 +130,57 @@ class SemanticMapStore:
         self._seen = seen
         return seen
 
-    def _warnings(self, seen: _Seen) -> Iterator[str]:
-        if seen.fault is not None:
-            yield f"{seen.fault} Until then, the waypoints read before are given."
 
+class _FileRecords:
+    """The records of a file while they are changed; `Records`."""
 
-def _event_in_its_frame(document: MapDocument, event: Event) -> Event:
-    record = document.events.get(event.id)
-    return event_in_its_frame(event, None if record is None else record.event, document.frames)
+    def __init__(self, document: MapDocument) -> None:
+        self.document = document
 
+    @property
+    def map_id(self) -> str | None:
+        """The map that the file says it is of."""
+        return self.document.map_id
 
-def _known(document: MapDocument, key: str) -> Waypoint | None:
-    record = document.records.get(key)
-    return None if record is None else record.waypoint
+    @property
+    def frames(self) -> Frames:
+        """All of them."""
+        return self.document.frames
+
+    def read(self) -> SemanticMap:
+        """Return all places."""
+        return self.document.places
+
+    def read_events(self) -> Mapping[str, Event]:
+        """Return all events by their ids."""
+        events = cast("tuple[Event, ...]", self.document.records_of("events"))
+        return {event.id: event for event in events}
+
+    def find_place(self, key: str) -> Waypoint | None:
+        """Return what is remembered under a `name_key`."""
+        return cast("Waypoint | None", self.document.find("waypoints", key))
+
+    def bind(self, map_id: str | None) -> None:
+        """Bind the file to the map that its waypoints belong to, where it does not say one."""
+        self.document = self.document.bound_to(map_id)
+
+    def put(self, record: OneRecord) -> OneRecord:
+        """Write a record; return it as it reads."""
+        self.document = self.document.with_record(record)
+        return cast("OneRecord", self.document.find(list_key_of(record), key_of(record)))
+
+    def put_places(self, waypoints: Iterable[Waypoint]) -> None:
+        """Write many places."""
+        for waypoint in waypoints:
+            self.put(waypoint)
+
+    def remove(self, key: str) -> None:
+        """Forget the place with a `name_key`."""
+        self.document = self.document.without_place(key)
+
+    def write_entry(self, key: str, value: str) -> None:
+        """Write what the file says under a key of its own."""
+        self.document = self.document.with_entry(key, value)
 
 
 def _raised_again(fault: SemanticMapError | None) -> SemanticMapError:
