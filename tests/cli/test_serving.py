@@ -33,7 +33,7 @@ def test_the_help_names_every_toolset_and_those_that_are_there_by_default(tmp_pa
 
     said = " ".join(CliRunner().invoke(cli, ["serve", "--help"]).output.split())
 
-    found = re.search(r"in place of ([\w,]+); others are ([\w, ]+)\.", said)
+    found = re.search(r"\(default: ([\w,]+)\); others are ([\w, ]+)\.", said)
     assert found is not None
     assert tuple(found[1].split(",")) == DEFAULT_TOOLSETS
     others = set(re.findall(r"\w+", found[2])) - {"and"}

@@ -337,7 +337,7 @@ SIGNS = {Health.FINE: "ok", Health.DOUBTFUL: "??", Health.MISSING: "--"}
 
 @click.command()
 @add_options(ROBOT_OPTIONS)
-@click.option("--json", "as_json", is_flag=True, help="The findings as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 def doctor(
     robot: str,
     robot_file: Path | None,
@@ -347,7 +347,7 @@ def doctor(
 ) -> None:
     """Check a robot: what was found, how fresh it is, what is missing and how to start it.
 
-    Ends with 0 when all is well, with 1 when something is missing, with 2 when it cannot be
+    Exit status: 0 if all is well, 1 if something is missing, 2 if it cannot be
     reached.
     """
     choice = RobotChoice(robot=robot, robot_file=robot_file, ca_file=ca_file, seed=seed)

@@ -44,14 +44,14 @@ POLL_S = 0.01
 
 @click.command()
 @CONTROL_OPTION
-@click.option("--reason", default="mapspeak stop", show_default=True, help="For the log.")
+@click.option("--reason", default="mapspeak stop", show_default=True, help="Reason for the log.")
 @click.option(
     "--wait-s", default=2.0, show_default=True, help="How long to wait for servers to answer."
 )
 def stop(control: Path | None, reason: str, wait_s: float) -> None:
     """Stop every robot that is served from here, and hold it until `mapspeak release`.
 
-    Ends with 1 when a robot has not answered, or none; the hold is there all the same.
+    Exit status: 1 if any robot has not answered, or there is none; the hold is set anyway.
     """
     hold = Hold(control_folder(control))
     stopped, unanswered = hold_robots(hold, reason=" ".join(reason.split()), wait_s=wait_s)

@@ -33,7 +33,7 @@ SEED_OPTION = click.option(
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Of the simulated robot's noise.",
+    help="Seed of the simulated robot's noise.",
 )
 WORLD_OPTION = click.option(
     "--world", default=DEFAULT_WORLD, show_default=True, help="A world or world file."
@@ -44,10 +44,10 @@ ROBOT_HELP = (
 )
 ROBOT_OPTIONS = (
     click.option("--robot", default=f"sim:{DEFAULT_WORLD}", show_default=True, help=ROBOT_HELP),
+    click.option("--robot-file", type=FILE, help="robot.yaml: what discovery does not find."),
     click.option(
-        "--robot-file", type=FILE, help="robot.yaml: what is not to be found by asking the robot."
+        "--ca-file", type=FILE, help="Certificates of the authority to trust for wss, as PEM."
     ),
-    click.option("--ca-file", type=FILE, help="Whose certificates a wss robot may show, as PEM."),
     SEED_OPTION,
 )
 
@@ -68,7 +68,7 @@ ANCHOR_OPTION = click.option(
     type=(float, float, float),
     callback=_read_anchor,
     metavar="LAT LON YAW",
-    help="Where on Earth the map's (0, 0) lies, and its x axis from east, in degrees.",
+    help="Latitude and longitude of the map's (0, 0), and the angle of its x axis from east.",
 )
 
 
@@ -125,15 +125,15 @@ _umask_of_person: ContextVar[int | None] = ContextVar("umask_of_person", default
 CONTROL_OPTION = click.option(
     "--control",
     type=click.Path(path_type=Path, file_okay=False),
-    help="The folder by which `mapspeak stop` reaches servers; in the user's data folder unless "
-    "given.",
+    help="The folder through which `mapspeak stop` reaches servers (default: in the user's data "
+    "folder).",
 )
 SKILL_OPTIONS = (
     click.option(
         "--expose",
         multiple=True,
         metavar="PATTERN",
-        help="Topics, services and actions of the robot that are tools of their own while it "
+        help="Make tools of topics, services and actions of the robot while it "
         'offers them, such as "/gripper/*".',
     ),
 )
@@ -149,7 +149,7 @@ GUARD_OPTIONS = (
     click.option(
         "--audit",
         type=FILE,
-        help="The log of every command, as JSON lines; in the user's data folder unless given.",
+        help="The log of every command, as JSON lines (default: in the user's data folder).",
     ),
     CONTROL_OPTION,
 )

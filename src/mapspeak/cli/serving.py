@@ -90,7 +90,7 @@ class ToolChoice:
     "robot_files",
     multiple=True,
     metavar="[NAME=]FILE",
-    help="robot.yaml: what is not to be found by asking the robot.",
+    help="robot.yaml: what discovery does not find.",
 )
 @add_options(ROBOT_OPTIONS[2:])
 @click.option(
@@ -98,7 +98,7 @@ class ToolChoice:
     type=click.Choice(["real", "virtual"]),
     default="real",
     show_default=True,
-    help="virtual: simulated time passes only during calls, as fast as it computes.",
+    help="virtual: simulated time passes only during calls, as fast as possible.",
 )
 @click.option("--detector", "has_detector", is_flag=True, help="Offer the simulated detector.")
 @click.option(
@@ -106,28 +106,32 @@ class ToolChoice:
     is_flag=False,
     flag_value=DEFAULT_HTTP,
     metavar="[HOST:PORT]",
-    help=f"Streaming HTTP instead of stdio, at /mcp; {DEFAULT_HTTP} unless said otherwise. GET "
-    f"/health answers ok. Beyond this machine clients must send the bearer token in "
+    help=f"Streaming HTTP instead of stdio, at /mcp; {DEFAULT_HTTP} by default. GET "
+    f"/health answers ok. On other addresses clients must send the bearer token in "
     f"{TOKEN_VARIABLE}.",
 )
 @click.option(
     "--toolsets",
     callback=split_names,
     default=None,
-    help="Groups of tools, comma-separated, in place of look,places,drive,paper; others are "
-    "explore, routes, memory, ros and skills. +NAME adds one to these, as in +explore.",
+    help="Groups of tools, comma-separated (default: look,places,drive,paper); others are "
+    "explore, routes, memory, ros and skills. +NAME adds one to the default.",
 )
-@click.option("--tools", callback=split_names, default=None, help="Single tools besides.")
+@click.option(
+    "--tools", callback=split_names, default=None, help="Further single tools, comma-separated."
+)
 @add_options(SKILL_OPTIONS)
-@click.option("--read-only", "is_read_only", is_flag=True, help="No tool that changes anything.")
+@click.option(
+    "--read-only", "is_read_only", is_flag=True, help="Offer only tools that change nothing."
+)
 @click.option(
     "--memory",
     "--semantic-map",
     "semantic_maps",
     multiple=True,
     metavar="[NAME=]FILE|postgresql://...",
-    help="The YAML file of remembered places, or a fleet's database. Unless given, a simulated one "
-    "begins with an empty one, removed in the end; others have one per map in the data folder.",
+    help="The YAML file of remembered places, or a fleet's database. By default a simulated robot "
+    "gets a temporary one, and other robots one per map in the data folder.",
 )
 @click.option(
     "--state-log", type=FILE, help="Write the simulator's truth here, as JSON lines, for scoring."
@@ -135,35 +139,35 @@ class ToolChoice:
 @click.option(
     "--final-map",
     type=FILE,
-    help="Write the simulated robot's map here in the end, as map_server's .yaml and .pgm.",
+    help="Write the simulated robot's map here at exit, as map_server's .yaml and .pgm.",
 )
 @click.option(
     "--map",
     "known_map",
     type=FILE,
-    help="The finished map (map_server's .yaml) in which the simulated robot finds its place.",
+    help="A finished map (map_server's .yaml) in which the simulated robot localises itself.",
 )
 @click.option(
     "--start",
     callback=read_pose,
     metavar="X,Y,YAW_DEG",
-    help="Where the simulated robot stands at first, as the world file counts.",
+    help="Initial pose of the simulated robot, in the frame of the world file.",
 )
 @click.option(
     "--lease-s",
     default=60.0,
     show_default=True,
-    help="Over HTTP, a driving robot is stopped when no client was heard for so long.",
+    help="Over HTTP: stop a driving robot after this time without a request of its client.",
 )
 @click.option(
     "--representation",
     callback=read_representation,
     metavar="NAME",
-    help="For evaluations, how look_at_map shows the map: picture-table (default), table, "
+    help="For evaluations: how look_at_map shows the map: picture-table (default), table, "
     "picture-rooms, picture-numbers, paper-picture or raw-grid.",
 )
 @click.option(
-    "--call-log", type=FILE, help="Note every call and answer here, as JSON lines, with pictures."
+    "--call-log", type=FILE, help="Log every call and answer here, as JSON lines, with pictures."
 )
 @VIEW_OPTION
 @add_options(GUARD_OPTIONS)

@@ -34,7 +34,7 @@ DEFAULT_ROSBRIDGE = "127.0.0.1:9090"
     default=DEFAULT_ROSBRIDGE,
     show_default=True,
     metavar="[[HOST:]PORT]",
-    help="Where rosbridge clients find it.",
+    help="Address for rosbridge clients.",
 )
 @click.option("--ros", type=click.Choice(["1", "2"]), default="2", show_default=True)
 @WORLD_OPTION
@@ -43,7 +43,7 @@ DEFAULT_ROSBRIDGE = "127.0.0.1:9090"
     "--send-action-goals-in-new-thread",
     "goals_in_new_thread",
     is_flag=True,
-    help="A goal does not hold up its client's socket, as in rosbridge told so.",
+    help="As the parameter of that name in rosbridge: a goal does not block its client's socket.",
 )
 def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread: bool) -> None:  # noqa: FBT001 - a flag
     """Offer the simulated robot to any rosbridge client, as a robot with ROS 1 or ROS 2."""
@@ -96,7 +96,7 @@ MEMORY = "semantic_map.yaml"
     "--out",
     "folder",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Where the results go; out/demo-WORLD-SEED unless given.",
+    help="Folder for the results (default: out/demo-WORLD-SEED).",
 )
 @click.option("--quiet", "is_quiet", is_flag=True, help="Print the result only.")
 def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  # noqa: FBT001 - a flag
