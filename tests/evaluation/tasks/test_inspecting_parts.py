@@ -1,19 +1,17 @@
 import pytest
 
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.tasks.inspecting import InspectionPart, PartKind, judge_parts
+from mapspeak.evaluation.tasks.inspecting import AnswerPart, judge_parts
 from mapspeak.evaluation.trials import Failure, TrialState
 
 MAP = (
-    InspectionPart(PartKind.NAME, "/map"),
-    InspectionPart(PartKind.SIZE, "384 x 320"),
-    InspectionPart(PartKind.NUMBER, "0.05 m", 0.001),
+    AnswerPart("/map"),
+    AnswerPart("384 x 320"),
+    AnswerPart("0.05 m", 0.001),
 )
 
 
-def judged(
-    answer: str, *parts: InspectionPart, is_ordered: bool = True
-) -> tuple[bool, Failure | None]:
+def judged(answer: str, *parts: AnswerPart, is_ordered: bool = True) -> tuple[bool, Failure | None]:
     score = judge_parts(Evidence(states=(), answer=answer), parts, is_ordered=is_ordered)
     return score.is_success, score.failure
 
@@ -57,7 +55,7 @@ def test_parts_right_are_counted_in_a_wrong_answer() -> None:
 
 
 def test_names_in_any_order_must_be_all_and_no_others() -> None:
-    both = (InspectionPart(PartKind.NAME, "/a"), InspectionPart(PartKind.NAME, "/b"))
+    both = (AnswerPart("/a"), AnswerPart("/b"))
     assert judged("ANSWER: /b, /a", *both, is_ordered=False)[0]
     assert not judged("ANSWER: /b, /a", *both)[0]
     assert not judged("ANSWER: /a", *both, is_ordered=False)[0]
@@ -66,7 +64,7 @@ def test_names_in_any_order_must_be_all_and_no_others() -> None:
 
 
 def test_types_count_in_the_words_of_either_ros() -> None:
-    kind = InspectionPart(PartKind.TYPE, "std_srvs/Trigger")
+    kind = AnswerPart("std_srvs/Trigger")
     assert judged("ANSWER: std_srvs/srv/Trigger", kind)[0]
     assert judged("ANSWER: std_srvs/Trigger", kind)[0]
     assert not judged("ANSWER: Trigger", kind)[0]
@@ -74,7 +72,7 @@ def test_types_count_in_the_words_of_either_ros() -> None:
 
 
 def test_a_link_is_two_frames_in_their_order() -> None:
-    link = InspectionPart(PartKind.LINK, "map -> odom")
+    link = AnswerPart("map -> odom")
     assert judged("ANSWER: map -> odom", link)[0]
     assert judged("ANSWER: map to odom", link)[0]
     assert not judged("ANSWER: odom -> map", link)[0]

@@ -56,11 +56,16 @@ class Stream:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfferedService:
-    """One service of a node; its answer is always empty."""
+    """One service of a node; its answer is always empty.
+
+    Attributes:
+        deed: What it is for, in a question's words.
+    """
 
     node: str
     service: str
     type: str
+    deed: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,11 +133,9 @@ class InspectedSystem:
         return replace(
             self,
             streams=tuple(each for each in self.streams if each.node != node),
-            subscriptions={
-                each: wanted for each, wanted in self.subscriptions.items() if each != node
-            },
+            subscriptions={each: told for each, told in self.subscriptions.items() if each != node},
             services=tuple(each for each in self.services if each.node != node),
-            parameters={name: each for name, each in self.parameters.items() if name != node},
+            parameters={each: told for each, told in self.parameters.items() if each != node},
         )
 
 

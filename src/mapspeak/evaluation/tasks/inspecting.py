@@ -3,7 +3,12 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
+from functools import cache
+from importlib import resources
+from string import Template
+from typing import Any
+
+from ruamel.yaml import YAML
 
 from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
 from mapspeak.evaluation.inspected.playing import InspectedSystem
@@ -11,65 +16,49 @@ from mapspeak.evaluation.scores.judging import Evidence, no_answer, read_said, v
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
-from mapspeak.ros.messages.fields import Dialect, bare_type
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.spatial import OccupancyGrid
 
 QUOTES = " \t'\"`*"
 NUMBER = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:%|percent|Hz|m|s|seconds?|met(?:re|er)s?)?")
 SIZE = re.compile(r"(\d+)\s*(?:x|\u00d7|by)\s*(\d+)(?:\s*cells)?")
-LINK = re.compile(r"(\S+)\s*(?:->|\u2192|to)\s*(\S+)")
-
-
-class PartKind(StrEnum):
-    """How a part is compared."""
-
-    NAME = "name"
-    """Of a node, topic, service, parameter or field; a leading slash may be missing."""
-    TYPE = "type"
-    """In the words of either ROS."""
-    WORD = "word"
-    NUMBER = "number"
-    """With a unit or none, to a tolerance."""
-    SIZE = "size"
-    """Two whole numbers, "384 x 320"."""
-    LINK = "link"
-    """Two frames, "map -> odom"."""
+LINK = re.compile(r"(\S+)\s*(?:->|\u2192|\bto\b)\s*(\S+)")
+KIND = re.compile(r"/(?:msg|srv|action)/")
 
 
 @dataclass(frozen=True, slots=True)
-class InspectionPart:
-    """One part of a right answer.
+class AnswerPart:
+    """One part of a right answer: a name, a type, a word, a size, a link or a number.
 
     Attributes:
-        tolerance: How far a number may be off, in its own unit.
+        tolerance: How far a number may be off, in its own unit; None where it is no number.
     """
 
-    kind: PartKind
     said: str
-    tolerance: float = 0.0
+    tolerance: float | None = None
 
     def fits(self, said: str) -> bool:
         """Return True when something said is right."""
-        match self.kind:
-            case PartKind.NUMBER:
-                numbers = NUMBER.fullmatch(self.said), NUMBER.fullmatch(said)
-                if numbers[0] is None or numbers[1] is None:
-                    return said == self.said
-                return abs(float(numbers[0][1]) - float(numbers[1][1])) <= self.tolerance
-            case PartKind.SIZE | PartKind.LINK:
-                pattern = SIZE if self.kind is PartKind.SIZE else LINK
-                ours, theirs = pattern.fullmatch(self.said), pattern.fullmatch(said)
-                return bool(ours and theirs and _bare(ours) == _bare(theirs))
-            case PartKind.TYPE:
-                return "/" in said and bare_type(said) == bare_type(self.said)
-            case PartKind.WORD:
-                return said.casefold() == self.said.casefold()
-            case PartKind.NAME:
-                return said.strip("/") == self.said.strip("/")
+        if self.tolerance is None:
+            return _plain(said) == _plain(self.said)
+        ours, theirs = NUMBER.fullmatch(self.said), NUMBER.fullmatch(said)
+        if ours is None or theirs is None:
+            return False
+        return abs(float(ours[1]) - float(theirs[1])) <= self.tolerance
+
+
+def _plain(said: str) -> list[str]:
+    """Return words without what may be written in several ways.
+
+    Leading slashes of names may be missing, types are written as either ROS does, and a size and a
+    link are two words with a sign between them.
+    """
+    text = KIND.sub("/", SIZE.sub(r"\1 \2", LINK.sub(r"\1 \2", said.casefold())))
+    return [word.strip("/") for word in text.split()]
 
 
 def judge_parts(
-    evidence: Evidence, truth: Sequence[InspectionPart], *, is_ordered: bool = True
+    evidence: Evidence, truth: Sequence[AnswerPart], *, is_ordered: bool = True
 ) -> Score:
     """Judge an answer in parts: all have to be right, and no other may be there."""
     said = read_said(evidence.answer)
@@ -88,10 +77,6 @@ def judge_parts(
     return verdict(reason, figures, failure=None if is_right else Failure.WRONG_ANSWER)
 
 
-def _bare(match: re.Match[str]) -> tuple[str, ...]:
-    return tuple(each.strip("/") for each in match.groups())
-
-
 LIMITS = Limits(n_calls=60, robot_time_s=600.0, wall_s=600.0)
 OPENING = (
     "Inspect the robot's ROS. "
@@ -102,8 +87,9 @@ COARSENINGS = (1, 2, 3, 4)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A robot as it was drawn, in good order."""
+    """A robot as it was drawn, in good order, and the name of what is asked about it."""
 
+    name: str
     draw: Draw
     names: Names
     system: InspectedSystem
@@ -111,18 +97,21 @@ class Case:
 
     def ask(
         self,
-        text: str,
-        form: str,
-        parts: tuple[InspectionPart, ...],
+        *parts: AnswerPart,
         system: InspectedSystem | None = None,
-        *,
         is_ordered: bool = True,
+        **told: object,
     ) -> Setting:
-        """Return the setting of a question.
+        """Return the setting of the question.
 
         Args:
-            form: How the answer is to be written, with an example; after "ANSWER: ".
+            parts: Of the right answer.
+            system: With a fault; None for the one in good order.
+            told: What the question has drawn, by the names in its text.
         """
+        question = _read_questions()[self.name]
+        text = Template(question["ask"]).substitute(vars(self.names), **told)
+        form = question["form"]
         return Setting(
             prompt=f"{OPENING} {text} {NO_DRIVING} End with a line of the form ANSWER: {form}.",
             start=self.draw.site.world.start,
@@ -138,25 +127,31 @@ class Case:
         )
 
 
+@cache
+def _read_questions() -> dict[str, Any]:
+    text = resources.files(__package__).joinpath("inspections.yaml").read_text(encoding="utf-8")
+    return dict(YAML(typ="safe", pure=True).load(text))
+
+
 def inspection_task(name: str, ask: Callable[[Case], Setting]) -> Task:
     """Return the task of answering a question by what the robot's ROS says.
 
     Nothing is simulated but the ROS. The world gives the map that the robot carries, so that it
     needs no exploration. Trials with an odd seed are of ROS 1, those with an even one of ROS 2.
     """
-    return Task(name=name, draw=lambda draw: ask(_draw_case(draw)), judge=_judge, needs_map=False)
+
+    def draw(draw: Draw) -> Setting:
+        grid = _coarsen(draw.site.floor.visible, draw.one_of(COARSENINGS))
+        names = draw_names(draw.random)
+        dialect = Dialect.ROS1 if draw.seed % 2 else Dialect.ROS2
+        system = draw_system(draw.random, names, grid, dialect=dialect)
+        return ask(Case(name=name, draw=draw, names=names, system=system, grid=grid))
+
+    return Task(name=f"inspect-{name}", draw=draw, judge=_judge, needs_map=False)
 
 
 def _judge(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
     return judge_parts(evidence, truth["parts"], is_ordered=truth["is_ordered"])
-
-
-def _draw_case(draw: Draw) -> Case:
-    grid = _coarsen(draw.site.floor.visible, draw.one_of(COARSENINGS))
-    names = draw_names(draw.random)
-    dialect = Dialect.ROS1 if draw.seed % 2 else Dialect.ROS2
-    system = draw_system(draw.random, names, grid, dialect=dialect)
-    return Case(draw=draw, names=names, system=system, grid=grid)
 
 
 def _coarsen(grid: OccupancyGrid, factor: int) -> OccupancyGrid:
