@@ -11,7 +11,14 @@ from mapspeak.simulator.simulation import (
     StateRecord,
     read_state_log,
 )
-from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth, is_in_sight, slice_at_eye_level
+from mapspeak.simulator.truth import (
+    MeasuredRoom,
+    TrueFloor,
+    Truth,
+    is_in_sight,
+    measure_shares_in_view,
+    slice_at_eye_level,
+)
 from mapspeak.simulator.worlds.world import (
     BODY_RADIUS_M,
     TrueRoom,
@@ -46,6 +53,7 @@ __all__ = [
     "WorldWall",
     "is_in_sight",
     "load_world",
+    "measure_shares_in_view",
     "read_state_log",
     "slice_at_eye_level",
     "world_names",

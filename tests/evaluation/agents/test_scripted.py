@@ -1,3 +1,5 @@
+import math
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -6,6 +8,8 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from hearing import Hearing
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient
+from mapspeak.evaluation.agents.driver import ToolDriver
+from mapspeak.evaluation.agents.finding import SCRIPTS
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.geometry import Pose
@@ -21,6 +25,14 @@ ROOM = """
 ##############
 """
 PROMPT = "Fire detected nearby. Navigate to the tool used for it."
+
+
+@pytest.mark.parametrize(("script", "n_seen"), [("scripted", 2), ("near-sighted", 1), ("blind", 0)])
+def test_eyes_that_are_not_sharp_note_what_is_near(script: str, n_seen: int) -> None:
+    work = SCRIPTS[script]
+    sight_m = work.keywords["sight_m"] if isinstance(work, partial) else math.inf
+    told = "- desk, bearing +3 deg, range 1.2 m\n- fridge, bearing -3 deg, range 4.0 m"
+    assert len(ToolDriver(ToolClient(None), sight_m=sight_m).note(told)) == n_seen
 
 
 async def run(folder: Path, *tools: str) -> tuple[AgentEnd, Hearing]:

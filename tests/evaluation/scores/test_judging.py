@@ -13,6 +13,7 @@ from mapspeak.evaluation.scores.judging import (
     judge_room,
     judge_route,
     judge_thing,
+    judge_view,
     read_letters,
     read_number,
     read_point,
@@ -20,7 +21,7 @@ from mapspeak.evaluation.scores.judging import (
     spl,
 )
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.trials import Failure, TrialState
+from mapspeak.evaluation.trials import Failure, ToolCall, TrialState
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.coverage import measure_coverage
@@ -78,6 +79,30 @@ def test_a_thing_behind_a_wall_is_not_reached_however_near_it_is(flat: GroundTru
     things = flat.things("fire_extinguisher")
     assert judge_thing(flat, ended_at(Point(4.0, 0.5)), things).is_success
     assert judge_thing(flat, ended_at(CORRIDOR), things).failure is Failure.WRONG_OBJECT
+
+
+def test_a_thing_is_faced_from_near_and_in_sight_of_it_alone(flat: GroundTruth) -> None:
+    things = flat.things("fire_extinguisher")
+
+    def faced(place: Point, yaw_rad: float) -> float:
+        return judge_thing(flat, ended_at(place, yaw_rad=yaw_rad), things).figures[
+            "faced_near_ratio"
+        ]
+
+    assert faced(Point(5.8, 0.5), 0.0) == 1.0
+    assert faced(Point(5.8, 0.5), math.pi / 2) == 0.0
+    assert faced(Point(4.0, 0.5), 0.0) == 0.0
+    assert faced(Point(7.6, 0.5), math.pi) == 0.0
+
+
+def test_a_picture_counts_that_was_taken_and_shows_the_thing(flat: GroundTruth) -> None:
+    things = flat.things("fire_extinguisher")
+    looked = (ToolCall(tool="look_through_camera", arguments={}),)
+    ahead = replace(ended_at(Point(4.0, 0.5)), calls=looked)
+    assert judge_view(flat, ahead, things).is_success
+    aside = replace(ended_at(Point(4.0, 0.5), yaw_rad=math.pi), calls=looked)
+    assert judge_view(flat, aside, things).failure is Failure.WRONG_OBJECT
+    assert judge_view(flat, ended_at(Point(4.0, 0.5)), things).failure is Failure.NO_ANSWER
 
 
 def test_a_place_counts_to_so_many_metres() -> None:

@@ -5,8 +5,10 @@ from pathlib import Path
 import anyio
 import pytest
 
+from hearing import Hearing
 from mapspeak.evaluation.agent import Assignment, ServerAccess, ToolClient
 from mapspeak.evaluation.agents.baselines import answer_at_random
+from mapspeak.evaluation.agents.finding import SCRIPTS
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.runs.workplace import open_inspection
 from mapspeak.evaluation.scores.judging import Evidence
@@ -137,6 +139,22 @@ async def test_chance_answers_nothing(site: GroundTruth, tmp_path: Path, task: s
         setting = set_up(site, task, seed)
         end = await answer_at_random(assign(setting, seed, tmp_path), ToolClient(None))
         assert not judge(site, task, setting, end.answer).is_success, end.answer
+
+
+@pytest.mark.parametrize("script", sorted(SCRIPTS))
+async def test_no_script_calls_a_tool_that_is_not_offered(
+    site: GroundTruth, tmp_path: Path, script: str
+) -> None:
+    setting = set_up(site, "inspect-missing", 0)
+    assert setting.inspected is not None
+    async with open_inspection(
+        setting.inspected, ServerAccess.MEMORY, toolsets=("ros",), folder=tmp_path
+    ) as opened:
+        assert opened.client is not None
+        offered = {tool.name for tool in (await opened.client.list_tools()).tools}
+        heard = Hearing()
+        await SCRIPTS[script](assign(setting, 0, tmp_path), ToolClient(opened.client, heard))
+    assert {*heard.calls} <= offered
 
 
 async def test_what_is_offered_only_reads(site: GroundTruth, tmp_path: Path) -> None:

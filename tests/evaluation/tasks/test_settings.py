@@ -1,10 +1,11 @@
 import math
+import re
 
 import pytest
 
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.server.prompts import read_text
 from mapspeak.simulator import load_world, world_names
 from sites import MEMORY_TEXT
@@ -83,3 +84,35 @@ def test_a_spoiled_memory_no_longer_says_where_the_thing_is() -> None:
     for seed in range(20):
         setting = find_task("missing-note").make_setting(site, seed=seed, memory=MEMORY_TEXT)
         assert f"label: {site.label_of(setting.truth['kind'])}" not in (setting.memory or "")
+
+
+def test_an_id_of_last_week_comes_with_where_the_room_lies() -> None:
+    site = site_of("office")
+    setting = find_task("stale-id").make_setting(site, seed=2, memory=MEMORY_TEXT)
+    middle = site.middle_of(site.room_named(setting.truth["rooms"][0]))
+    assert f"({middle.x:.2f}, {middle.y:.2f})" in setting.prompt
+    assert re.search(r"go to R\d\.", setting.prompt)
+
+
+def test_the_nearest_and_the_farthest_are_clearly_so() -> None:
+    site, task = site_of("warehouse"), find_task("superlative")
+    for seed in range(6):
+        setting = task.make_setting(site, seed=seed, memory=MEMORY_TEXT)
+        start = (site.world.start.inverse() @ setting.start).point
+        ways_m = {
+            thing.name: site.shortest_to_any_m(start, site.seen_around(thing, 2.0))
+            for thing in site.things(setting.truth["kind"])
+        }
+        is_far = "farthest" in setting.prompt
+        chosen = (max if is_far else min)(ways_m, key=lambda name: ways_m[name])
+        assert chosen == setting.truth["name"]
+
+
+def test_points_of_one_room_are_asked_for_among_those_of_its_neighbours() -> None:
+    site, task = site_of("office"), find_task("question-same-room")
+    setting = task.make_setting(site, seed=3, memory=MEMORY_TEXT)
+    points = re.findall(r"\b([A-H]) \((-?[\d.]+), (-?[\d.]+)\)", setting.prompt)
+    here = site.room_at(Point(*setting.truth["point"]))
+    same = [name for name, x, y in points if site.room_at(Point(float(x), float(y))) == here]
+    assert same == setting.truth["letters"]
+    assert 0 < len(same) < len(points)

@@ -9,19 +9,13 @@ import numpy as np
 
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient, gave_up
 from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label, read_map_picture
-from mapspeak.evaluation.agents.exploring import (
-    MARGIN_M,
-    SIGHT_M,
-    point_of_largest,
-    ways_to_floor_m,
-)
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.geometry import Point, Pose
-from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
-from mapspeak.spatial.paths import clearance_m
+from mapspeak.spatial.paths import clearance_m, distances_from
 
 # --- the oracle, and chance ----------------------------------------------------------------------
 
@@ -126,13 +120,17 @@ LEAST_EDGE_M = 0.6
 DOOR_M = 1.2
 """Free floor no wider counts as a doorway when rooms are told apart by eye."""
 LEAST_ROOM_M2 = 1.0
+SIGHT_M = 4.0
+"""How far a border counts as seen: beyond it is seen, but small."""
+MARGIN_M = 0.45
+"""A goal keeps this clear of walls: as much as the robot needs and a little more."""
 
 
 async def _record(driver: ToolDriver) -> Pose:
     """Record what is ahead, and return where that was."""
     sightings = await driver.see()
     pose = await driver.find_pose()
-    await driver.record(f"{pose.x:.1f}, {pose.y:.1f}", sightings)
+    await driver.record(sightings)
     return pose
 
 
@@ -177,7 +175,9 @@ async def follow_paper(task: Assignment, tools: ToolClient) -> AgentEnd:
     if task.prompt.startswith(SMALLEST):
         return await _go_to_smallest_patch(driver)
     label = find_label(task.prompt)
-    return gave_up("I do not know how.") if label is None else await _recall(driver, label)
+    if label is None or not await driver.is_offered("get_semantic_data"):
+        return gave_up("I do not know how.")
+    return await _recall(driver, label)
 
 
 async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
@@ -216,7 +216,9 @@ def _choose_waypoint(
     edge = grid.free & (cv2.dilate(grid.unknown.view(np.uint8), np.ones((3, 3), np.uint8)) > 0)
     cells = round(2 * SIGHT_M / grid.resolution_m) | 1
     in_sight = cv2.blur(edge.astype(np.float32), (cells, cells), borderType=cv2.BORDER_CONSTANT)
-    rows, cols = np.nonzero(np.isfinite(ways_to_floor_m(grid, robot, radius_m=MARGIN_M)))
+    rows, cols = np.nonzero(grid.free)
+    ways_m = distances_from(grid, robot, radius_m=MARGIN_M).distances_at(rows, cols)
+    rows, cols = rows[np.isfinite(ways_m)], cols[np.isfinite(ways_m)]
     if not rows.size:
         return None
     points = grid.points_at(rows, cols)
@@ -250,16 +252,18 @@ async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
     areas_m2 = statistics[:, cv2.CC_STAT_AREA] * grid.resolution_m**2
     patches = [label for label in range(1, n_patches) if areas_m2[label] >= LEAST_ROOM_M2]
     for label in sorted(patches, key=lambda each: float(areas_m2[each])):
-        deepest = point_of_largest(grid, np.where(labels == label, room_m, -1.0))
-        if await driver.drive(x=deepest.x, y=deepest.y) == ARRIVED:
+        deepest = np.where(labels == label, room_m, -1.0).argmax()
+        row, col = np.unravel_index(int(deepest), room_m.shape)
+        middle = grid.point_at(Cell(int(row), int(col)))
+        if await driver.drive(x=middle.x, y=middle.y) == ARRIVED:
             return AgentEnd(answer="This looks like the smallest room.")
     return gave_up("I see no room that I can get to.")
 
 
 async def _recall(driver: ToolDriver, label: str) -> AgentEnd:
     """Go to the nearest waypoint, in a straight line, that remembers the thing."""
-    seen, pose = await driver.recall(label), await driver.find_pose()
-    if not seen:
+    places, pose = await driver.recall(label), await driver.find_pose()
+    if not places:
         return gave_up(f"I remember no {label}.")
-    nearest = min(seen, key=lambda each: each.view.point.distance_to(pose.point))
-    return AgentEnd(answer=f"{nearest.place}: {await driver.drive(place=nearest.place)}.")
+    nearest = min(places, key=lambda place: places[place].distance_to(pose.point))
+    return AgentEnd(answer=f"{nearest}: {await driver.drive(place=nearest)}.")

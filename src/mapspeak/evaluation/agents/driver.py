@@ -16,7 +16,6 @@ from PIL import Image
 from mapspeak.errors import MapError
 from mapspeak.evaluation.agent import ToolClient
 from mapspeak.geometry import Point, Pose
-from mapspeak.places.standing import point_ahead
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
 # --- reading -------------------------------------------------------------------------------------
@@ -175,39 +174,18 @@ ARRIVED = "arrived"
 REFUSED = "refused"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
-    """One thing as one remembered place has seen it.
-
-    Attributes:
-        place: The id of the remembered place.
-        bearing_rad: From the place's heading; None where it was not noted.
-        range_m: From the place; infinite where it was not noted.
-    """
-
-    place: str
-    view: Pose
-    bearing_rad: float | None
-    range_m: float
-
-    @property
-    def thing(self) -> Point | None:
-        """Where the thing is; None where bearing or range are not known."""
-        if self.bearing_rad is None or math.isinf(self.range_m):
-            return None
-        return point_ahead(self.view.point, self.view.yaw_rad + self.bearing_rad, self.range_m)
-
-
 @dataclass(slots=True)
 class ToolDriver:
     """Calls tools in a script's name.
 
     Attributes:
         wait_s: How long each call waits for the end of a drive, in robot time.
+        sight_m: How far it takes note of what the detector reports; 0 for a blind one.
     """
 
     tools: ToolClient
     wait_s: float = WAIT_S
+    sight_m: float = math.inf
     _n_views: int = 0
 
     async def is_offered(self, tool: str) -> bool:
@@ -224,21 +202,26 @@ class ToolDriver:
         pose = robot.get("pose", robot)
         return Pose(pose["x"], pose["y"], math.radians(pose["yaw_deg"]))
 
-    async def recall(self, label: str) -> list[Seen]:
-        """Return everything remembered that bears a label, the nearest sightings first."""
+    async def find_things(self, label: str) -> list[dict[str, Any]]:
+        """Return the remembered things of a name, the nearest by path first."""
+        found = (await self.tools.demand("find_place", query=label)).report["candidates"]
+        things = [each for each in found if each["kind"] == "thing" and label in each["name"]]
+        return sorted(things, key=lambda thing: math.inf if (m := thing["path_m"]) is None else m)
+
+    async def recall(self, label: str) -> dict[str, Point]:
+        """Return the remembered places, by id, from which something of a name was seen."""
         records: list[dict[str, Any]] = []
         while True:
             page = (await self.tools.demand("get_semantic_data", from_row=len(records))).report
             records += page["waypoints"]
             if not page["waypoints"] or len(records) >= page["n_places"]:
                 break
-        found = [
-            _seen(record, landmark)
+        return {
+            record["id"]: Point(record["pose"]["x"], record["pose"]["y"])
             for record in records
             for landmark in (*record["safety_landmarks"], *record["functional_landmarks"])
             if label in landmark["label"]
-        ]
-        return sorted(found, key=lambda seen: seen.range_m)
+        }
 
     async def drive(self, **goal: object) -> str:
         """Drive to a `place`, or to `x`, `y` and perhaps `yaw_deg`; return how it ended."""
@@ -249,12 +232,6 @@ class ToolDriver:
             )
         return REFUSED if answer.is_error else str(answer.report["state"])
 
-    async def find_nearest(self, places: list[str]) -> str | None:
-        """Return which of some places is the nearest by path; None where no way leads to any."""
-        text = (await self.tools.demand("measure", places=places, start="robot")).text
-        rows = re.findall(r"^(\w+) \| [^|]+ \| \d", text, re.MULTILINE)
-        return rows[0] if rows else None
-
     async def find_region(self, point: Point) -> str:
         """Return the id of the room, corridor or hall at a point; empty where there is none."""
         place = f"{point.x:.2f}, {point.y:.2f}"
@@ -264,23 +241,18 @@ class ToolDriver:
 
     async def see(self) -> tuple[DetectedThing, ...]:
         """Take a picture and return what the detector reports of it."""
-        return read_sightings((await self.tools.demand("look_through_camera")).text)
+        return self.note((await self.tools.demand("look_through_camera")).text)
 
-    async def record(self, place: str, sightings: tuple[DetectedThing, ...]) -> None:
+    def note(self, text: str) -> tuple[DetectedThing, ...]:
+        """Return what the detector reports beside a picture, as far as this one sees."""
+        return tuple(each for each in read_sightings(text) if each.range_m <= self.sight_m)
+
+    async def record(self, sightings: tuple[DetectedThing, ...]) -> None:
         """Remember what is seen from here, under a number."""
         self._n_views += 1
+        place = (await self.tools.demand("get_robot_pose")).report["place"]
         record = describe_view(self._n_views, place, sightings)
         await self.tools.demand("write_semantic_data", **record)
-
-
-def _seen(record: dict[str, Any], landmark: dict[str, Any]) -> Seen:
-    pose, bearing_deg = record["pose"], landmark["bearing_deg"]
-    return Seen(
-        place=record["id"],
-        view=Pose(pose["x"], pose["y"], math.radians(pose["yaw_deg"])),
-        bearing_rad=None if bearing_deg is None else math.radians(bearing_deg),
-        range_m=math.inf if landmark["range_m"] is None else landmark["range_m"],
-    )
 
 
 CUES = (

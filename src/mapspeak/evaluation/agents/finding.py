@@ -24,12 +24,16 @@ from mapspeak.installation import say_install
 
 ORACLE, MOCK = "oracle", "mock"
 COMMAND = "command:"
+NEAR_SIGHT_M = 2.0
+"""So far sees the script whose eyes are not sharp; things are seen from three times as far."""
 CLIENT = "openai"
 """The package that inspect-ai speaks through where there is no other; the extra brings it."""
 CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
 """Packages that it speaks through to other providers."""
 SCRIPTS: dict[str, Work] = {
     "scripted": follow_script,
+    "near-sighted": partial(follow_script, sight_m=NEAR_SIGHT_M),
+    "blind": partial(follow_script, sight_m=0.0),
     "random": answer_at_random,
     "nearest-frontier": explore_nearest_frontiers,
     "paper-loop": follow_paper,
@@ -39,6 +43,12 @@ SCRIPTS: dict[str, Work] = {
 def agent_names() -> tuple[str, ...]:
     """Return the names of the agents that need nothing else."""
     return (*SCRIPTS, ORACLE, MOCK)
+
+
+def is_script(answerer: str) -> bool:
+    """Return True for an agent behind which no model stands, with or without a way to think."""
+    name = answerer.partition("+")[0]
+    return name in agent_names() or name.startswith("mockllm/")
 
 
 def check_agent(name: str, thinking: str | None = None) -> None:

@@ -17,37 +17,37 @@ from mapspeak.evaluation.agents.driver import (
     WAIT_S,
     MapReading,
     Row,
-    Seen,
     ToolDriver,
     find_label,
-    read_sightings,
 )
-from mapspeak.evaluation.agents.exploring import ScriptedExploration, is_room
 from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.trials import TrialState
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.standing import point_ahead
 
-NEAR_M = 4.5
-"""A place that saw a thing from no farther leads to it."""
 BESIDE_M = 1.5
 """So near it goes to a thing that it has found by itself."""
 NUMBER = r"-?\d+(?:\.\d+)?"
-ORDINALS = {"second": 2, "third": 3, "fourth": 4}
 SIDES_DEG = {"to the left of": 90.0, "to the right of": -90.0, "in front of": 0.0, "behind": 180.0}
 COMPASS_DEG = {"east": 0.0, "north": 90.0, "west": 180.0, "south": -90.0}
 ASIDE_M = (1.2, 2.0, 3.0)
 MOST_ASIDE = 3
-MOST_COMPARED = 20
+MOST_TRIED = 3
 MOST_STEPS = 120
 SEARCH = "search_for"
 
 Deed = Callable[[ToolDriver, re.Match[str]], Awaitable[AgentEnd]]
 
 
-async def follow_script(task: Assignment, tools: ToolClient) -> AgentEnd:
-    """Read the prompt by its words and do what fits."""
-    driver = ToolDriver(tools)
+async def follow_script(
+    task: Assignment, tools: ToolClient, *, sight_m: float = math.inf
+) -> AgentEnd:
+    """Read the prompt by its words and do what fits.
+
+    Args:
+        sight_m: How far it takes note of what the detector reports; it reads all text.
+    """
+    driver = ToolDriver(tools, sight_m=sight_m)
     try:
         for pattern, deed in DEEDS:
             match = re.search(pattern, task.prompt)
@@ -66,8 +66,20 @@ async def follow_script(task: Assignment, tools: ToolClient) -> AgentEnd:
 # --- exploring -----------------------------------------------------------------------------------
 
 
-async def _explore(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
-    await ScriptedExploration(driver.tools).explore()
+MOST_STOPS = 200
+
+
+async def _explore(driver: ToolDriver, _match: re.Match[str]) -> AgentEnd:
+    """Let the robot explore until pictures show all walls, and record what is seen at each stop."""
+    await driver.record(await driver.see())
+    for _ in range(MOST_STOPS):
+        answer = await driver.tools.demand(
+            "explore", cover="camera", stops_at_goals=True, wait_s=driver.wait_s
+        )
+        if answer.pictures:
+            await driver.record(driver.note(answer.text))
+        if answer.report["state"] not in ("driving", "at_goal"):
+            break
     return AgentEnd(answer="Everything that can be reached is on the map.")
 
 
@@ -75,17 +87,8 @@ async def _explore(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
 
 
 async def _go_to_room_by_size(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    view = await driver.look()
-    is_from_below = match["end"] == "smallest"
-    rows = view.rows("Rooms")
-    if is_from_below:
-        rows = tuple(row for row in rows if is_room(row, view.rows("Doors")))
-    rooms = sorted(rows, key=lambda row: row.number("floor m2"))
-    number = ORDINALS.get(match["ordinal"] or "", 1)
-    if len(rooms) < number:
-        return gave_up("There are not so many rooms.")
-    chosen = rooms[number - 1] if is_from_below else rooms[-number]
-    return await _go_to_region(driver, chosen.id)
+    size = "-".join(filter(None, (match["ordinal"], match["end"])))
+    return await _go_to_region(driver, f"{size} room")
 
 
 async def _go_to_longest_corridor(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
@@ -99,6 +102,12 @@ async def _go_to_longest_corridor(driver: ToolDriver, _: re.Match[str]) -> Agent
 async def _go_to_region(driver: ToolDriver, place: str) -> AgentEnd:
     state = await driver.drive(place=place)
     return AgentEnd(answer=f"{place}: {state}.")
+
+
+async def _go_by_note(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
+    """Go by where a note says that a room lies, not by the id that it once had."""
+    room = await driver.find_region(Point(float(match["x"]), float(match["y"])))
+    return await _go_to_region(driver, room)
 
 
 async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
@@ -123,24 +132,22 @@ async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> Agen
 
 
 async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
-    """Drive to the nearest place that saw it from near; what one look has shown is checked."""
-    seen = await driver.recall(label)
-    if not seen:
-        return await _search(driver, label)
-    enough_m = max(NEAR_M, seen[0].range_m)
-    near = [each for each in seen if each.range_m <= enough_m]
-    places = list(dict.fromkeys(each.place for each in near))[:MOST_COMPARED]
-    nearest = await driver.find_nearest(places)
-    chosen = next((each for each in near if each.place == nearest), near[0])
-    state = await driver.drive(place=chosen.place)
-    is_found = state == ARRIVED
-    if is_found and len(seen) == 1:
-        is_found = any(label in sighting.label for sighting in await driver.see())
-    if not is_found:
-        return await _search(driver, label)
-    if chosen.range_m > NEAR_M and chosen.thing is not None:
-        await driver.drive(place=f"facing {chosen.thing.x:.2f}, {chosen.thing.y:.2f}")
-    return AgentEnd(answer=f"I am at {chosen.place}, from where {label} was seen.")
+    """Drive up to the nearest remembered one; what one look has shown is checked."""
+    for thing in (await driver.find_things(label))[:MOST_TRIED]:
+        if await driver.drive(place=thing["id"]) != ARRIVED:
+            continue
+        if len(thing["seen_from"]) == 1:
+            if not await _is_there(driver, thing["id"], label):
+                continue
+            await driver.drive(place=thing["id"])
+        return AgentEnd(answer=f"I stand before {thing['id']}, a {label}.")
+    return await _search(driver, label)
+
+
+async def _is_there(driver: ToolDriver, thing: str, label: str) -> bool:
+    """Look at a remembered thing from where it should be in view."""
+    look = await driver.tools.call("look_at", place=thing, wait_s=driver.wait_s)
+    return any(label in sighting.label for sighting in driver.note(look.text))
 
 
 async def _search(driver: ToolDriver, label: str) -> AgentEnd:
@@ -151,7 +158,7 @@ async def _search(driver: ToolDriver, label: str) -> AgentEnd:
     for _ in range(MOST_STEPS):
         if answer.is_error:
             return gave_up(answer.text)
-        found = [each for each in read_sightings(answer.text) if label in each.label]
+        found = [each for each in driver.note(answer.text) if label in each.label]
         if found:
             return await _approach(driver, label, found[0].bearing_deg, found[0].range_m)
         if answer.report["state"] not in ("driving", "look", "reported"):
@@ -187,25 +194,24 @@ async def _go_beside_pose(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
 
 
 async def _go_beside_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    thing = _place_of(await driver.recall(match["label"]))
-    if thing is None:
+    things = await driver.find_things(match["label"])
+    if not things:
         return gave_up(f"I remember no {match['label']}.")
     heading_rad = math.radians(COMPASS_DEG[match["direction"]])
-    goal = point_ahead(thing, heading_rad, float(match["away"]))
+    goal = point_ahead(Point(*things[0]["position"]), heading_rad, float(match["away"]))
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 
-async def _face_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    thing = _place_of(await driver.recall(match["label"]))
-    if thing is None:
-        return gave_up(f"I remember no {match['label']}.")
-    state = await driver.drive(place=f"facing {thing.x:.2f}, {thing.y:.2f}")
-    return AgentEnd(answer=f"It {state}.")
+async def _go_by_way(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
+    return await _go_to_region(driver, f"{match['order']} {match['label']}")
 
 
-def _place_of(seen: list[Seen]) -> Point | None:
-    """Return where a thing is, by the sighting from the least distance that has a bearing."""
-    return next((each.thing for each in seen if each.thing is not None), None)
+async def _take_picture(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
+    """Look at those that are remembered until one is seen."""
+    for thing in (await driver.find_things(match["label"]))[:MOST_TRIED]:
+        if await _is_there(driver, thing["id"], match["label"]):
+            return AgentEnd(answer=f"The picture shows {thing['id']}.")
+    return await _search(driver, match["label"])
 
 
 async def _follow(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
@@ -229,23 +235,29 @@ async def _answer_question(driver: ToolDriver, question: str) -> AgentEnd:
         return await _say_where_to_explore(driver)
     if "have to drive" in question:
         return await _say_way(driver, question)
-    view = await driver.look()
     region = await _region_at(driver, POINT.findall(question)[-1])
+    if "lie in the same" in question:
+        return await _choose(driver, question, {region})
+    view = await driver.look()
     rows = (row for table in view.tables.values() for row in table if "floor m2" in row.cells)
     row = next((row for row in rows if row.id == region), None)
     if row is None:
         return gave_up(UNTOLD)
-    if "square metres" in question:
-        return _answer(f"{row.number('free m2'):.1f} m2")
     doors = _ways_out(view, row)
-    if "How many doors" in question:
-        return _answer(str(len(doors)))
-    beside = [
+    if "square metres" in question or "How many doors" in question:
+        is_area = "square metres" in question
+        return _answer(f"{row.number('free m2'):.1f} m2" if is_area else str(len(doors)))
+    return await _choose(driver, question, {*doors.values()})
+
+
+async def _choose(driver: ToolDriver, question: str, regions: set[str]) -> AgentEnd:
+    """Answer with the letters of the points that lie in some regions."""
+    letters = [
         letter
         for letter, x, y in CHOICE.findall(question)
-        if await _region_at(driver, (x, y)) in doors.values()
+        if await _region_at(driver, (x, y)) in regions
     ]
-    return _answer(", ".join(sorted(beside)) or "none")
+    return _answer(", ".join(sorted(letters)) or "none")
 
 
 async def _say_where_to_explore(driver: ToolDriver) -> AgentEnd:
@@ -289,6 +301,9 @@ DEEDS: tuple[tuple[str, Deed], ...] = (
     (r"^Inspect the robot's ROS\.", lambda driver, match: diagnose(driver.tools, match.string)),
     (r"Answer without driving\.", lambda driver, match: _answer_question(driver, match.string)),
     (r"^Update the map", _explore),
+    (rf"around \((?P<x>{NUMBER}), (?P<y>{NUMBER})\) by its sketch", _go_by_note),
+    (r"^Take a picture of any (?P<label>.+?) and stay", _take_picture),
+    (r"^Go to the (?P<order>nearest|farthest) (?P<label>.+?), by the way", _go_by_way),
     (r"^Go to the (?:(?P<ordinal>\w+) )?(?P<end>smallest|largest) room", _go_to_room_by_size),
     (r"^Go to the longest corridor", _go_to_longest_corridor),
     (
@@ -304,6 +319,9 @@ DEEDS: tuple[tuple[str, Deed], ...] = (
         rf"^Go to the place (?P<away>{NUMBER}) m (?P<direction>\w+) of the (?P<label>.+?)\.",
         _go_beside_thing,
     ),
-    (r"^Go to the (?P<label>.+?), stop at most .* look straight", _face_thing),
+    (
+        r"^Go to the (?P<label>.+?), stop at most .* look straight",
+        lambda driver, match: _go_to_thing(driver, match["label"]),
+    ),
     (r"^Go first to any .+?\.", _follow),
 )

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
+from mapspeak.evaluation.agents.finding import is_script
 from mapspeak.evaluation.report.html import Html, document, element, paragraph, table, text
 from mapspeak.evaluation.report.replay import PAGE, REPLAY, show_standing, write_replay
 from mapspeak.evaluation.scores.rows import TableRow, count_rows, wilson_interval
@@ -15,7 +16,6 @@ from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, write_wh
 MOST_SAID = 240
 """Characters of an error in the list; all of it is in the replay."""
 NOT_RUN = "not run"
-SCRIPTS = frozenset({"scripted", "oracle", "random", "nearest-frontier", "paper-loop", "mock"})
 
 PAPER_TASKS = ("explore", "smallest-room", "fire-tool")
 """The names of its Tasks 1 to 3 here."""
@@ -77,8 +77,7 @@ def _our_row(agent: str, representation: str, rows: Iterable[TableRow]) -> list[
         row.task: row for row in rows if (row.agent, row.representation) == (agent, representation)
     }
     explored, *others = (found.get(task) for task in PAPER_TASKS)
-    is_script = agent.partition("+")[0] in SCRIPTS or agent.startswith("mockllm/")
-    kind = "a script, no model" if is_script else "a model or client program"
+    kind = "a script, no model" if is_script(agent) else "a model or client program"
     return [
         _cell(agent, f"here, {representation}: {kind}"),
         _cell(NOT_RUN) if explored is None else _coverage(explored),

@@ -19,7 +19,7 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
-from mapspeak.evaluation.agents.finding import can_think
+from mapspeak.evaluation.agents.finding import can_think, is_script
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
 from mapspeak.evaluation.scores.rows import TableRow, wilson_interval
 from mapspeak.evaluation.tasks.catalogue import EXPLORE
@@ -28,6 +28,7 @@ from mapspeak.evaluation.trials import Trial, TrialResult, Turn
 SHOWN = {
     "coverage_recall": "recall",
     "coverage_known_ratio": "known",
+    "faced_near_ratio": "faced",
     "spl": "SPL",
     "driven_m": "driven m",
     "n_calls": "calls",
@@ -169,7 +170,7 @@ def _cells_of(row: TableRow) -> tuple[str, ...]:
     figures = (row.figures.get(name) for name in SHOWN)
     return (
         row.task,
-        row.agent,
+        f"{row.agent} (script)" if is_script(row.agent) else row.agent,
         row.representation,
         f"{row.n_successes}/{row.n_trials}",
         span,

@@ -13,7 +13,8 @@ import numpy as np
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.trials import Failure, Score, ToolCall, TrialState
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.simulator import StateRecord, WorldObject
+from mapspeak.simulator import StateRecord, WorldObject, measure_shares_in_view
+from mapspeak.simulator.camera.camera import SMALLEST_AREA_RATIO
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.coverage import measure_coverage
 from mapspeak.spatial.grid import Mask
@@ -215,18 +216,53 @@ def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -
     return _judged(evidence, f"It stands in {name}, not in {named}.", figures, kind)
 
 
+PICTURING = ("look_through_camera", "look_at", "look_around", "explore", "search_for")
+FACED_M, FACED_RAD = 1.5, math.radians(30.0)
+"""A robot that stands this near to a thing and turned to it so far has it right before it."""
+
+
 def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
-    """Judge whether the robot stands near one of some things, in free sight of it."""
+    """Judge whether the robot stands near one of some things, in free sight of it.
+
+    `faced_near_ratio` is 1 where it stands within 1.5 m of one that it faces, in sight of it, else
+    0: what a person means by "go to it". The success is the paper's, as far as it saw things from.
+    """
     here = evidence.end
     away_m = {thing.name: here.distance_to(site.place_of(thing)) for thing in things}
     in_sight = [thing for thing in things if site.is_in_sight(here, thing)]
     nearest = min(in_sight or things, key=lambda thing: away_m[thing.name])
     distance_m = away_m[nearest.name]
+    is_faced = any(
+        away_m[thing.name] <= FACED_M and _heading_off_rad(site, evidence, thing) <= FACED_RAD
+        for thing in in_sight
+    )
     seen = "in sight" if in_sight else "out of sight"
-    said = f"{distance_m:.1f} m from {nearest.name}, {seen}."
+    said = f"{distance_m:.1f} m from {nearest.name}, {seen}{', facing it' if is_faced else ''}."
     is_there = bool(in_sight) and distance_m <= BESIDE_M
     failure = None if is_there else Failure.WRONG_OBJECT
-    return _judged(evidence, said, {"distance_to_object_m": distance_m}, failure)
+    figures = {"distance_to_object_m": distance_m, "faced_near_ratio": float(is_faced)}
+    return _judged(evidence, said, figures, failure)
+
+
+def _heading_off_rad(site: GroundTruth, evidence: Evidence, thing: WorldObject) -> float:
+    """Return how far the robot's heading in the end is off a thing."""
+    here = evidence.last.pose
+    return abs(wrap_angle(here.point.bearing_to(site.place_of(thing)) - here.yaw_rad))
+
+
+def judge_view(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
+    """Judge whether a picture was taken, and whether one from there shows one of some things.
+
+    The world is drawn anew from there: a thing counts that takes up as much of the picture as the
+    detector's smallest.
+    """
+    if not any(call.tool in PICTURING for call in evidence.calls):
+        return _judged(evidence, "It took no picture.", {}, Failure.NO_ANSWER)
+    shares = measure_shares_in_view(site.world, site.in_world(evidence.last.pose))
+    share = max(shares.get(thing.name, 0.0) for thing in things)
+    said = f"{100 * share:.2f} % of the picture are {things[0].kind.replace('_', ' ')}."
+    failure = None if share >= SMALLEST_AREA_RATIO else Failure.WRONG_OBJECT
+    return _judged(evidence, said, {"shown_ratio": share}, failure)
 
 
 def judge_near(evidence: Evidence, goal: Point, *, within_m: float) -> Score:
@@ -243,7 +279,7 @@ def judge_pose(
     """Judge whether the robot looks at a thing from near, with nothing in between."""
     here, place = evidence.last.pose, site.place_of(thing)
     away_m = here.point.distance_to(place)
-    off_rad = abs(wrap_angle(here.point.bearing_to(place) - here.yaw_rad))
+    off_rad = _heading_off_rad(site, evidence, thing)
     figures = {"distance_to_object_m": away_m, "heading_off_deg": math.degrees(off_rad)}
     said = f"{away_m:.1f} m from {thing.name}, {math.degrees(off_rad):.0f} deg off."
     is_posed = away_m <= within_m and off_rad <= facing_rad

@@ -58,7 +58,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "paper": (EXPLORE, "smallest-room", "fire-tool"),
         "rooms": tuple(task.name for task in ROOM_TASKS),
-        "objects": ("fire-tool", "object"),
+        "objects": ("fire-tool", "object", "view", "superlative"),
         "relations": tuple(task.name for task in RELATION_TASKS),
         "routes": ("route",),
         "search": ("search",),

@@ -24,6 +24,8 @@ from mapspeak.spatial.rooms import RoomClass
 
 LIMITS = Limits(n_calls=30, robot_time_s=60.0, wall_s=600.0)
 LETTERS = "ABCDEFGH"
+N_SAME = 3
+"""Points in one room, when it is asked which are."""
 MOST_NEAR, MOST_FAR = 3, 2
 """Rooms to choose from: neighbours, and others."""
 ENOUGH_NEW_RATIO = 0.5
@@ -100,6 +102,27 @@ def _ask_neighbours(draw: Draw, _start: Pose) -> Question:
         "point": pair(middle),
         "choices": {letter: pair(each) for letter, each in middles.items()},
     }
+
+
+def _ask_same(draw: Draw, _start: Pose) -> Question:
+    """Ask which points lie in one room: wrong where rooms are split that are one, or joined."""
+    site = draw.site
+    room = draw.one_of(site.rooms)
+    beside = [each for each in site.rooms if each.room.name in site.neighbours(room)]
+    spaces = [room] * N_SAME + draw.shuffled(beside)[:MOST_NEAR]
+    shown = dict(zip(LETTERS, draw.shuffled(spaces), strict=False))
+    points = {
+        letter: site.draw_pose(draw.random, site.cells_of(each)).point
+        for letter, each in shown.items()
+    }
+    listed = "; ".join(f"{letter} {point_text(point)}" for letter, point in points.items())
+    middle = site.middle_of(room)
+    text = (
+        f"Each letter is a point: {listed}. Which of them lie in the same room, corridor or hall "
+        f"as {point_text(middle)}? End with a line of the form ANSWER: A, C - or ANSWER: none."
+    )
+    letters = [letter for letter, each in shown.items() if each is room]
+    return text, {"letters": letters, "said": ", ".join(letters), "point": pair(middle)}
 
 
 def _ask_way(draw: Draw, start: Pose) -> Question:
@@ -187,6 +210,12 @@ QUESTION_TASKS = (
     Task(
         name="question-neighbours",
         draw=_question(_ask_neighbours),
+        judge=lambda _site, truth, evidence: judge_choice(evidence, truth["letters"]),
+        is_offered=lambda site: len(site.rooms) > 1,
+    ),
+    Task(
+        name="question-same-room",
+        draw=_question(_ask_same),
         judge=lambda _site, truth, evidence: judge_choice(evidence, truth["letters"]),
         is_offered=lambda site: len(site.rooms) > 1,
     ),

@@ -7,7 +7,7 @@ import numpy as np
 
 from mapspeak.evaluation.scores.judging import judge_room
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.tasks.task import Draw, Task
+from mapspeak.evaluation.tasks.task import Draw, Task, point_text
 from mapspeak.evaluation.trials import Setting
 from mapspeak.simulator import MeasuredRoom
 from mapspeak.spatial.rooms import RoomClass
@@ -106,7 +106,29 @@ def _length_m(room: MeasuredRoom) -> float:
     return max((one.distance_to(other) for one in corners for other in corners), default=math.nan)
 
 
+MOST_NUMBER = 9
+
+
+def _draw_stale_id(draw: Draw) -> Setting:
+    """Tell an id that a room may have had, and where it lies."""
+    room, number = draw.one_of(draw.site.rooms), int(draw.random.integers(1, MOST_NUMBER + 1))
+    goal = draw.site.cells_of(room)
+    start = draw.start(without=goal)
+    prompt = (
+        f"A note of last week says: go to R{number}. It is the space around "
+        f"{point_text(draw.site.middle_of(room))} by its sketch. Go there; ids may have changed."
+    )
+    truth = {"rooms": [room.room.name], "shortest_m": draw.shortest_m(start, goal)}
+    return draw.setting(prompt, start, truth)
+
+
 ROOM_TASKS = (
+    Task(
+        name="stale-id",
+        draw=_draw_stale_id,
+        judge=lambda site, truth, evidence: judge_room(site, evidence, truth["rooms"]),
+        is_offered=lambda site: len(site.rooms) > 1,
+    ),
     _room_task("smallest-room", _smallest),
     _room_task("largest-room", _largest),
     _room_task("nth-room", _nth),

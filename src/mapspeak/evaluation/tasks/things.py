@@ -13,6 +13,7 @@ from mapspeak.evaluation.scores.judging import (
     judge_pose,
     judge_route,
     judge_thing,
+    judge_view,
 )
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
@@ -20,6 +21,7 @@ from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point
 from mapspeak.places.standing import point_ahead
 from mapspeak.simulator import WorldObject
+from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.visibility import mean_on_line
 
 # --- things by name, or by what they are for -----------------------------------------------------
@@ -31,6 +33,8 @@ FIRE_WISH = "Fire detected nearby. Navigate to the tool used for it."
 SEARCH_TOOLS = ("search_for", "look_around")
 SEARCH_LIMITS = Limits(n_calls=200, robot_time_s=2400.0, wall_s=900.0)
 OUT_OF_THE_WAY_M = 1.0
+NEAR_M = 2.0
+MOST_TRIES = 200
 
 
 @cache
@@ -89,7 +93,65 @@ def _draw_search(draw: Draw) -> Setting:
     return thing_setting(draw, prompt, kind, is_known=False, tools=tools, limits=SEARCH_LIMITS)
 
 
+def _draw_view(draw: Draw) -> Setting:
+    """Ask for a picture of a thing that the memory may know."""
+    kind = str(draw.random.choice(findable_kinds(draw.site)))
+    prompt = f"Take a picture of any {draw.site.label_of(kind)} and stay where it was taken."
+    return thing_setting(draw, prompt, kind, tools=SEARCH_TOOLS, limits=SEARCH_LIMITS)
+
+
+NEAREST, FARTHEST = "nearest", "farthest"
+CLEARLY_FARTHER = 1.3
+"""By this much the ways to two things have to differ where the nearest or farthest is asked for."""
+
+
+def _draw_by_way(draw: Draw) -> Setting:
+    """Ask for the nearest or the farthest of several things, where it is clear which that is."""
+    site = draw.site
+    for _ in range(MOST_TRIES):
+        kind, order = draw.one_of(_several_kinds(site)), draw.one_of((NEAREST, FARTHEST))
+        things, start = site.things(kind), draw.start()
+        ways = site.ways_from(start.point)
+        ways_m = [_way_to(site, ways, thing) for thing in things]
+        ordered = sorted(range(len(things)), key=lambda at: ways_m[at], reverse=order == FARTHEST)
+        near_m, far_m = sorted(ways_m[at] for at in ordered[:2])
+        if near_m > OUT_OF_THE_WAY_M and CLEARLY_FARTHER * near_m <= far_m < math.inf:
+            break
+    chosen = things[ordered[0]]
+    label = site.label_of(kind)
+    prompt = f"Go to the {order} {label}, by the way that you have to drive, and stop before it."
+    truth = {"kind": kind, "name": chosen.name, "shortest_m": round(ways_m[ordered[0]], 3)}
+    return draw.setting(prompt, start, truth)
+
+
+def _way_to(site: GroundTruth, ways: DistanceField, thing: WorldObject) -> float:
+    """Return the way to the nearest place from which a thing is seen from near."""
+    rows, cols = np.nonzero(site.seen_around(thing, NEAR_M))
+    return float(ways.distances_at(rows, cols).min(initial=math.inf))
+
+
+def _several_kinds(site: GroundTruth) -> list[str]:
+    return [kind for kind in findable_kinds(site) if len(site.things(kind)) > 1]
+
+
+def _judge_by_way(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+    chosen = [thing for thing in site.things(truth["kind"]) if thing.name == truth["name"]]
+    return judge_thing(site, evidence, chosen)
+
+
 OBJECT_TASKS = (
+    Task(
+        name="view",
+        draw=_draw_view,
+        judge=lambda site, truth, evidence: judge_view(site, evidence, site.things(truth["kind"])),
+        is_offered=has_findable_kinds,
+    ),
+    Task(
+        name="superlative",
+        draw=_draw_by_way,
+        judge=_judge_by_way,
+        is_offered=lambda site: bool(_several_kinds(site)),
+    ),
     Task(
         name="fire-tool",
         draw=lambda draw: thing_setting(draw, FIRE_WISH, FIRE),
@@ -124,7 +186,6 @@ THING_TOLERANCE_M = 0.8
 """For places beside things, which are remembered by bearing and range."""
 FACING_WITHIN_M = 3.5
 FACING_RAD = math.radians(30.0)
-MOST_TRIES = 200
 LEAST_STOPS, MOST_STOPS = 2, 4
 ROUTE_LIMITS = Limits(n_calls=80, robot_time_s=1800.0, wall_s=900.0)
 
