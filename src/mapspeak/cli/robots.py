@@ -20,6 +20,7 @@ from mapspeak.installation import say_install
 
 if TYPE_CHECKING:
     from mapspeak.links.dds import DdsNetwork
+    from mapspeak.links.simulated import SimulatedRobot
     from mapspeak.robot import Robot
     from mapspeak.ros.discovery.overrides import RobotOverrides
     from mapspeak.ros.port import RosConnection
@@ -212,7 +213,8 @@ async def open_served_robot(choice: RobotChoice) -> AsyncGenerator[ServedRobot]:
     """
     if _is_simulated(choice):
         async with _open_simulated(choice) as robot:
-            yield ServedRobot(robot=robot, ros=None, map_name=robot.description.map_name)
+            name = robot.description.map_name
+            yield ServedRobot(robot=robot, ros=None, map_name=name, skilled=robot)
         return
     from mapspeak.links.arrival import Arrival  # noqa: PLC0415 - heavy; help must be quick
 
@@ -341,7 +343,7 @@ def _is_simulated(choice: RobotChoice) -> bool:
 
 
 @asynccontextmanager
-async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["Robot"]:
+async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["SimulatedRobot"]:
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.simulator import Simulation, StateLog, load_world  # noqa: PLC0415
     from mapspeak.spatial.mapfiles import MapMode, load_map  # noqa: PLC0415

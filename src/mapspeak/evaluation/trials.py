@@ -83,6 +83,9 @@ class Setting:
             maps from nothing, and the map frame begins at `start`.
         memory: The semantic map to start with, as YAML; None for an empty one.
         added: Things that stand in the world and that neither map nor memory knows.
+        shut: Doors that are shut at first, by name.
+        battery_ratio: How full the battery is at first.
+        n_faults: How often each skill fails before it works.
         toolsets: Groups of tools that are offered; None for the server's usual ones.
         tools: Single tools besides.
         inspected: The ROS that is asked about instead of the simulated robot, which then is not
@@ -97,6 +100,9 @@ class Setting:
     is_known: bool
     memory: str | None = None
     added: tuple[WorldObject, ...] = ()
+    shut: tuple[str, ...] = ()
+    battery_ratio: float = 1.0
+    n_faults: dict[str, int] = field(default_factory=dict)
     toolsets: tuple[str, ...] | None = None
     tools: tuple[str, ...] = ()
     limits: Limits = field(default_factory=Limits)

@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image
 
 from mapspeak.geometry import Pose
+from mapspeak.links.simulatedskills import build_skills
 from mapspeak.robot import (
     SCAN_PATIENCE_S,
     CameraPicture,
@@ -54,6 +55,9 @@ class SimulatedRobot:
 
     One touch of the simulation happens at a time. What has to be computed is, in a worker thread,
     so that the event loop stays free to answer a stop; what is at hand is read where it is asked.
+
+    Attributes:
+        skills: What it can do besides driving.
     """
 
     def __init__(
@@ -64,6 +68,7 @@ class SimulatedRobot:
         after_step: Callable[[], None] | None = None,
     ) -> None:
         self._simulation = simulation
+        self.skills = build_skills(self, simulation.equipment)
         self._has_detector = has_detector
         self._after_step = after_step or _do_nothing
         self._turn = anyio.Lock()
@@ -153,6 +158,14 @@ class SimulatedRobot:
     async def advance_to(self, until_s: float) -> None:
         """Compute the world up to that robot time."""
         await self._run(lambda: self._advance_to(until_s))
+
+    async def fetch_battery(self) -> float | None:
+        """Return how full its battery is, from 0 to 1."""
+        return self._simulation.equipment.charge_ratio
+
+    async def compute(self, work: Callable[[], T]) -> T:
+        """Touch the simulation when nobody else does."""
+        return await self._run(work)
 
     async def _run(self, work: Callable[[], T]) -> T:
         async with self._turn:

@@ -2,6 +2,7 @@
 
 from mapspeak.simulator.camera.camera import HORIZONTAL_FOV_RAD
 from mapspeak.simulator.robot.controller import KEEP_OFF_M
+from mapspeak.simulator.robot.equipment import Equipment
 from mapspeak.simulator.robot.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
 from mapspeak.simulator.robot.physics import MAX_SPEED_MPS, MAX_TURN_RADPS, BodyVelocity
 from mapspeak.simulator.simulation import (
@@ -39,6 +40,7 @@ __all__ = [
     "MAX_TURN_RADPS",
     "TICK_S",
     "BodyVelocity",
+    "Equipment",
     "LidarScan",
     "MeasuredRoom",
     "Simulation",

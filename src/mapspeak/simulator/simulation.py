@@ -21,6 +21,7 @@ from mapspeak.simulator.camera.camera import (
     SimulatedDetector,
 )
 from mapspeak.simulator.robot.controller import Obstacles
+from mapspeak.simulator.robot.equipment import Equipment
 from mapspeak.simulator.robot.lidar import Lidar, LidarScan
 from mapspeak.simulator.robot.navigator import Navigator, Senses
 from mapspeak.simulator.robot.physics import STANDING, BodyVelocity, Odometry, RobotBody
@@ -41,6 +42,7 @@ class Simulation:
 
     Attributes:
         truth: What no robot may know; for scoring alone.
+        equipment: What the robot can do besides driving.
 
     Args:
         seed: Of all noise; the same seed and the same commands give the same run.
@@ -73,6 +75,7 @@ class Simulation:
             pose = world.start.inverse() @ start
             self._mapper = Localiser(known, pose, random=for_guess)
         self._navigator = Navigator()
+        self.equipment = Equipment(world, self._body, self._change)
         self._ended: dict[int, GoalStatus] = {}
         self._goal_id = 0
         self.truth = Truth(world, self._body, self._mapper)
@@ -89,6 +92,7 @@ class Simulation:
         """Let one tick of robot time pass."""
         step = self._body.move(self._command(), TICK_S)
         self._n_ticks += 1
+        self.equipment.pass_time(TICK_S)
         self._odometry.record(step)
         self._mapper.follow_odometry(self._odometry.odom_from_base)
         if self._n_ticks % _TICKS_PER_SCAN == 0:
@@ -187,7 +191,19 @@ class Simulation:
     def _camera(self) -> PinholeCamera:
         return PinholeCamera(self._world)
 
+    def _change(self, world: World) -> None:
+        """Let something be elsewhere: sensors, body and camera meet the world as it is now."""
+        self._world = world
+        solids = slice_world(world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
+        self._lidar.stand_among(solids)
+        self._body.stand_among(solids)
+        self._mapper.forget_obstacles()
+        self.__dict__.pop("_camera", None)
+        self._measure()
+
     def _command(self) -> BodyVelocity:
+        if self.equipment.charge_ratio <= 0:
+            self._navigator.give_up(GoalState.BLOCKED, "The battery is empty.")
         if not self._navigator.is_driving:
             return STANDING
         senses = Senses(
@@ -220,6 +236,7 @@ class StateRecord:
     Attributes:
         x: Metres, in a map without errors.
         slam_error_m: How far the robot's own pose was off.
+        deeds: What its skills have done so far, in order.
     """
 
     time_s: float
@@ -229,6 +246,8 @@ class StateRecord:
     slam_error_m: float
     driven_m: float
     n_collisions: int
+    battery_ratio: float = 1.0
+    deeds: tuple[str, ...] = ()
 
     @property
     def pose(self) -> Pose:
@@ -248,7 +267,15 @@ class StateRecord:
             slam_error_m=truth.slam_error_m,
             driven_m=truth.driven_m,
             n_collisions=truth.n_collisions,
+            battery_ratio=round(simulation.equipment.charge_ratio, 4),
+            deeds=tuple(map(str, simulation.equipment.deeds)),
         )
+
+    @classmethod
+    def read(cls, line: str | bytes) -> Self:
+        """Read a line of a state log."""
+        told = json.loads(line)
+        return cls(**{**told, "deeds": tuple(told.get("deeds", ()))})
 
 
 class StateLog:
@@ -286,4 +313,4 @@ class StateLog:
 def read_state_log(path: Path) -> tuple[StateRecord, ...]:
     """Read every whole line of a state log, which may still be growing."""
     whole_lines = path.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()
-    return tuple(StateRecord(**json.loads(line)) for line in whole_lines)
+    return tuple(map(StateRecord.read, whole_lines))

@@ -1,6 +1,5 @@
 """The robot and the server of one trial, and a client that is connected to them."""
 
-import json
 import math
 import os
 import sys
@@ -26,7 +25,7 @@ from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
-from mapspeak.simulator.worlds.worldfiles import write_with_more
+from mapspeak.simulator.worlds.worldfiles import write_as_changed
 from mapspeak.spatial.mapfiles import MapMode, load_map
 from mapspeak.spatial.mapwriting import write_map
 
@@ -63,13 +62,27 @@ class TrialSetup:
         chosen = self.setting.toolsets
         return DEFAULT_TOOLSETS if chosen is None else chosen
 
+    @property
+    def played(self) -> World:
+        """The world with all that the setting makes otherwise in it."""
+        setting, world = self.setting, self.world
+        shut = (replace(door, is_shut=door.name in setting.shut) for door in world.doors)
+        return replace(
+            world,
+            objects=(*world.objects, *setting.added),
+            doors=tuple(shut),
+            battery_ratio=setting.battery_ratio,
+            n_faults=setting.n_faults,
+        )
+
     def command(self) -> tuple[str, ...]:
         """Return the command line of a server for this trial; write the world it names."""
         setting, world = self.setting, self.trial.world
-        if setting.added:
+        played = self.played
+        if played != self.world:
             changed = self.folder / "world" / f"{self.world.name}.yaml"
             changed.parent.mkdir(exist_ok=True)
-            world = str(write_with_more(world, setting.added, changed))
+            world = str(write_as_changed(world, played, changed))
         start = setting.start
         known = () if self.known_map is None else ("--map", str(self.known_map))
         tools = ("--tools", ",".join(setting.tools)) if setting.tools else ()
@@ -133,13 +146,14 @@ async def open_workplace(setup: TrialSetup, connection: ServerAccess) -> AsyncGe
 @asynccontextmanager
 async def _open_in_memory(setup: TrialSetup) -> AsyncGenerator[Workplace]:
     setting = setup.setting
-    world = replace(setup.world, objects=(*setup.world.objects, *setting.added))
+    world = setup.played
     known = None if setup.known_map is None else load_map(setup.known_map).grid
     simulation = Simulation(world, seed=setup.trial.seed, known=known, start=setting.start)
     log = StateLog(simulation, setup.folder / STATES)
     robot = SoloRobot(simulation, has_detector=True, after_step=log.note)
     memory = SemanticMapStore(setup.folder / MEMORY, map_id=world.name)
-    session = Session(robot, memory, lease_s=math.inf, guard=_build_guard(setup, robot))
+    guard = _build_guard(setup, robot)
+    session = Session(robot, memory, lease_s=math.inf, guard=guard, skilled=robot)
     server = build_server(
         session,
         toolsets=setup.toolsets,
@@ -225,4 +239,4 @@ def _last_state(log: Path) -> StateRecord:
     with log.open("rb") as file:
         file.seek(max(file.seek(0, os.SEEK_END) - LINE_BYTES, 0))
         lines = file.read().rpartition(b"\n")[0].splitlines()
-    return StateRecord(**json.loads(lines[-1])) if lines else NOWHERE
+    return StateRecord.read(lines[-1]) if lines else NOWHERE

@@ -87,6 +87,7 @@ def build_panels(world: World, lamps: FloatArray, ceiling_m: float) -> tuple[Pan
         *_floor_and_ceiling(world, ceiling_m),
         *(panel for wall in _fill_corners(world.walls) for panel in _wall(wall, ceiling_m)),
         *(panel for door in world.doors for panel in _door(door, world)),
+        *(panel for door in world.doors if door.is_shut for panel in _wall(door.leaf, ceiling_m)),
         *(_lamp(place) for place in lamps),
     )
 

@@ -77,6 +77,10 @@ class Lidar:
         self._edges = solids.edges
         self._random = random
 
+    def stand_among(self, solids: Slice) -> None:
+        """Measure what is solid from now on."""
+        self._edges = solids.edges
+
     def scan(self, world_from_base: Pose, *, stamp_s: float) -> LidarScan:
         """Measure from where the robot truly stands."""
         ranges = measure_ranges(self._edges, world_from_base)

@@ -149,9 +149,7 @@ class RobotBody:
         self.world_from_base = start
         self.n_collisions = 0
         self.driven_m = 0.0
-        self._solids = solids
-        self._near = solids.near(start.point, reach_m=2 * _NEAR_M)
-        self._near_from = start.point
+        self.stand_among(solids)
         self._drive = DifferentialDrive()
         self._is_touching = False
 
@@ -159,6 +157,12 @@ class RobotBody:
     def velocity(self) -> BodyVelocity:
         """How it moves now."""
         return self._drive.velocity
+
+    def stand_among(self, solids: Slice) -> None:
+        """Bump into what is solid from now on."""
+        self._solids = solids
+        self._near_from = self.world_from_base.point
+        self._near = solids.near(self._near_from, reach_m=2 * _NEAR_M)
 
     def move(self, command: BodyVelocity, duration_s: float) -> Pose:
         """Move for a moment and return the step it took, in its frame before the step."""

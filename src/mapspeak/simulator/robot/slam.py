@@ -115,6 +115,9 @@ class Mapper(PoseTracker):
         """None: the robot plans on the map it publishes."""
         return None
 
+    def forget_obstacles(self) -> None:
+        """Do nothing: what a map of its own shows goes when scans show it free."""
+
     def add_scan(self, scan: LidarScan) -> None:
         """Match a scan to the map and add it, if the robot has moved enough to learn from it."""
         if not self._is_due(scan.stamp_s) or scan.n_returns < _FEWEST_RETURNS:
@@ -153,6 +156,10 @@ class Localiser(PoseTracker):
     def planning_map(self) -> OccupancyGrid:
         """The known map and the obstacles seen besides; the same one until there are more."""
         return self._layer.grid
+
+    def forget_obstacles(self) -> None:
+        """Forget what was seen besides the map, as a cleared costmap does."""
+        self._layer = _ObstacleLayer(self._known)
 
     def add_scan(self, scan: LidarScan) -> None:
         """Correct the pose by a scan, if the robot has moved enough to learn from it."""

@@ -97,7 +97,9 @@ class Slice:
 
 def slice_world(world: World, *, low_m: float, high_m: float) -> Slice:
     """Cut a world: return what is solid anywhere between two heights above the floor."""
-    outlines = [_outline_wall(wall) for wall in world.walls if low_m < wall.height_m]
+    leaves = [door.leaf for door in world.doors if door.is_shut]
+    upright = (*world.walls, *leaves)
+    outlines = [_outline_wall(wall) for wall in upright if low_m < wall.height_m]
     for thing in world.objects:
         outlines.extend(_outline_object(thing, low_m, high_m))
     return Slice(tuple(outlines))

@@ -1,6 +1,7 @@
 """A world as it truly is: walls, doors, objects, rooms. `worldfiles` reads it from a file."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.rooms import RoomClass
@@ -9,6 +10,8 @@ BODY_RADIUS_M = 0.28
 """Of the robot: a world must have room for it."""
 BODY_BAND_M = (0.02, 1.2)
 """The heights between which its body, camera mast included, bumps into things."""
+LEAF_M, LEAF_HEIGHT_M = 0.05, 2.1
+"""Of a door that is shut."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,11 +46,20 @@ class WorldDoor:
         name: Unique in its world.
         pose: The middle of the gap on the wall's centre line; its x axis looks along the wall.
         width_m: Between the two ends of the wall.
+        is_shut: Its leaf stands in it; the robot can have it opened.
     """
 
     name: str
     pose: Pose
     width_m: float
+    is_shut: bool = False
+
+    @property
+    def leaf(self) -> WorldWall:
+        """What stands in it while it is shut."""
+        half = self.width_m / 2
+        start, end = (self.pose.transform(Point(side * half, 0.0)) for side in (-1, 1))
+        return WorldWall(start=start, end=end, thickness_m=LEAF_M, height_m=LEAF_HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +109,8 @@ class World:
     Attributes:
         name: Such as "warehouse".
         start: Where the robot stands at first, in the world's own frame.
+        battery_ratio: How full its battery is then.
+        n_faults: How often each of its skills fails before it works, by name.
     """
 
     name: str
@@ -106,3 +120,5 @@ class World:
     rooms: tuple[TrueRoom, ...]
     start: Pose
     doors: tuple[WorldDoor, ...] = ()
+    battery_ratio: float = 1.0
+    n_faults: Mapping[str, int] = field(default_factory=dict)

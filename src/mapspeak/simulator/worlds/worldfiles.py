@@ -6,7 +6,7 @@ clockwise. `docs/reference/world-files.md` explains every key.
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -103,8 +103,10 @@ def read_world_text(name_or_path: str | Path) -> str:
     return _read_text(name_or_path)[2]
 
 
-def write_with_more(name_or_path: str | Path, things: Iterable[WorldObject], path: Path) -> Path:
-    """Write a world file with some things added, and return its path.
+def write_as_changed(name_or_path: str | Path, world: World, path: Path) -> Path:
+    """Write a world file that says what is otherwise in a world made of it, and return its path.
+
+    More things, doors that are shut, the battery and the faults of skills may be.
 
     Raises:
         ConfigError: The world is made from a map, which has no things.
@@ -115,7 +117,12 @@ def write_with_more(name_or_path: str | Path, things: Iterable[WorldObject], pat
         raise ConfigError(
             f"{name_or_path} is a map: nothing can be put into it.", hint="Use a world file."
         )
-    tree["objects"] = [*tree.get("objects", []), *map(_as_written, things)]
+    written = tree.get("objects", [])
+    tree["objects"] = [*written, *map(_as_written, world.objects[len(written) :])]
+    for door, told in zip(world.doors, tree.get("doors", []), strict=True):
+        told["shut"] = door.is_shut
+    tree["battery_percent"] = 100 * world.battery_ratio
+    tree["faults"] = dict(world.n_faults)
     with path.open("w", encoding="utf-8") as file:
         yaml.dump(tree, file)
     return path
@@ -156,6 +163,7 @@ class _WrittenDoor(_Written):
     at: _Place
     width_m: Annotated[float, Field(gt=0, le=50)]
     name: _Name | None = None
+    is_shut: Annotated[bool, Field(alias="shut")] = False
 
 
 class _WrittenRoom(_Written):
@@ -181,6 +189,8 @@ class _WorldFile(_Written):
     doors: tuple[_WrittenDoor, ...] = ()
     rooms: tuple[_WrittenRoom, ...] = ()
     objects: tuple[_WrittenObject, ...] = ()
+    battery_percent: Annotated[float, Field(ge=0, le=100)] = 100.0
+    faults: dict[_Name, Annotated[int, Field(ge=0, le=100)]] = {}
 
 
 # --- from a file to its faults ---------------------------------------------------------------
@@ -271,6 +281,8 @@ def _build_world(written: _WorldFile, name: str) -> World:
         rooms=tuple(_outline_room(room, index) for index, room in enumerate(written.rooms)),
         start=_pose(written.start.at, written.start.yaw_deg),
         doors=doors,
+        battery_ratio=written.battery_percent / 100,
+        n_faults=written.faults,
     )
 
 
@@ -330,6 +342,7 @@ def _place_doors(doors: Sequence[_WrittenDoor], walls: Sequence[WorldWall]) -> I
             name=door.name or f"door {index + 1}",
             pose=Pose(middle.x, middle.y, wrap_angle(nearest.pose.yaw_rad)),
             width_m=door.width_m,
+            is_shut=door.is_shut,
         )
 
 
