@@ -64,6 +64,7 @@ def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread:
                 host=host,
                 port=port,
                 goals_in_new_thread=goals_in_new_thread,
+                skilled=robot,
             ) as server,
         ):
             offered = f"{robot.description.name} in {robot.description.map_name}, ROS{ros}"

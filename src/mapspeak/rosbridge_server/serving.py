@@ -19,6 +19,7 @@ from mapspeak.rosbridge_server.conversation import LONGEST_MESSAGE, ClientConver
 from mapspeak.rosbridge_server.hub import Outbox
 from mapspeak.rosbridge_server.interfaces import RosSystem
 from mapspeak.rosbridge_server.stack import RosStack
+from mapspeak.skill import SkilledRobot
 
 FRAME_LENGTH = 1 << 18
 """A long message leaves in frames of this length: compressing one must not hold up the others."""
@@ -113,13 +114,16 @@ def open_rosbridge_server(
     host: str = DEFAULT_HOST,
     port: int = 0,
     goals_in_new_thread: bool = False,
+    skilled: SkilledRobot | None = None,
 ) -> AbstractAsyncContextManager[RosbridgeServer]:
     """Offer a robot as a rosbridge server with rosapi, as `serve_system` does.
+
+    What it can do besides driving is offered as services where it is given as `skilled` too.
 
     The robot's `sleep` must give way to other tasks: time passes here, and only by it.
     """
     return serve_system(
-        RosStack(robot, dialect=dialect),
+        RosStack(robot, dialect=dialect, skilled=skilled),
         host=host,
         port=port,
         goals_in_new_thread=goals_in_new_thread,

@@ -23,6 +23,8 @@ from mapspeak.ros.messages.poses import (
 from mapspeak.ros.messages.scans import LaserScan, write_camera_info, write_scan
 from mapspeak.rosbridge_server.drives import BASE_FRAME
 from mapspeak.rosbridge_server.hub import Hub
+from mapspeak.rosbridge_server.skillservices import BATTERY_TOPIC, write_battery
+from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
 
 TICK_S = 0.05
@@ -31,6 +33,7 @@ MAP_PERIOD_S = 1.0
 ESTIMATE_PERIOD_S = 0.5
 PICTURE_PERIOD_S = 0.2
 SCAN_PERIOD_S = 0.1
+BATTERY_PERIOD_S = 1.0
 CAMERA_FRAME, LASER_FRAME = "camera_link", "base_scan"
 IMAGE_TOPIC, INFO_TOPIC = "/camera/image_raw/compressed", "/camera/camera_info"
 SCAN_TOPIC = "/scan"
@@ -50,8 +53,11 @@ class Source:
 class Sources:
     """The robot's own publishers; all but maps only while a client listens."""
 
-    def __init__(self, robot: Robot, hub: Hub, *, dialect: Dialect) -> None:
+    def __init__(
+        self, robot: Robot, hub: Hub, *, dialect: Dialect, skilled: SkilledRobot | None = None
+    ) -> None:
         self._robot = robot
+        self._skilled = skilled
         self._hub = hub
         self._dialect = dialect
         self._grid: OccupancyGrid | None = None
@@ -64,6 +70,8 @@ class Sources:
             self._slow.append(Source(self._publish_picture, PICTURE_PERIOD_S))
         if robot.description.has_laser:
             self._slow.append(Source(self._publish_scan, SCAN_PERIOD_S))
+        if skilled is not None:
+            self._slow.append(Source(self._publish_battery, BATTERY_PERIOD_S))
 
     async def start(self) -> None:
         """Publish what is latched, so that the first client finds it."""
@@ -109,6 +117,13 @@ class Sources:
         message = write_grid(grid, dialect=self._dialect)
         self._hub.publish("/map", message)
         self._hub.publish("/map_metadata", message["info"])
+
+    async def _publish_battery(self) -> None:
+        ratio = None if self._skilled is None else await self._skilled.fetch_battery()
+        if ratio is not None and self._hub.is_wanted(BATTERY_TOPIC):
+            now_s = self._robot.now_s
+            message = write_battery(ratio, now_s, dialect=self._dialect)
+            self._hub.publish(BATTERY_TOPIC, message)
 
     async def _publish_picture(self) -> None:
         is_wanted = self._hub.is_wanted(IMAGE_TOPIC) or self._hub.is_wanted(INFO_TOPIC)

@@ -20,6 +20,13 @@ from mapspeak.rosbridge_server.movebase import MoveBase
 from mapspeak.rosbridge_server.nav2 import ACTION, Nav2
 from mapspeak.rosbridge_server.parameters import Parameters, add_parameter_services
 from mapspeak.rosbridge_server.rosapi import add_rosapi
+from mapspeak.rosbridge_server.skillservices import (
+    BATTERY_TOPIC,
+    BATTERY_TYPE,
+    NODE,
+    offer_skills,
+    types_of,
+)
 from mapspeak.rosbridge_server.sources import (
     IMAGE_TOPIC,
     INFO_TOPIC,
@@ -27,6 +34,7 @@ from mapspeak.rosbridge_server.sources import (
     TICK_S,
     Sources,
 )
+from mapspeak.skill import SkilledRobot
 
 STATUS_PERIOD_S = 0.2
 FEEDBACK_PERIOD_S = 0.1
@@ -111,6 +119,7 @@ class RosStack(RosSystem):
         robot: Any robot; its `sleep` must give way to other tasks.
         hub: Carries the robot's topics; one is made of `topics_of` where none is given.
         drives: Takes the goals; likewise.
+        skilled: The robot where it has skills of its own.
     """
 
     def __init__(
@@ -120,12 +129,18 @@ class RosStack(RosSystem):
         dialect: Dialect,
         hub: Hub | None = None,
         drives: Drives | None = None,
+        skilled: SkilledRobot | None = None,
     ) -> None:
-        hub = hub or Hub(topics_of(dialect, robot.description))
-        super().__init__(hub, Interfaces(dialect), dialect=dialect)
+        topics = topics_of(dialect, robot.description)
+        skills = () if skilled is None else skilled.skills
+        if skilled is not None:
+            topics.append(_published(BATTERY_TOPIC, BATTERY_TYPE, NODE, depth=1))
+        interfaces = Interfaces(dialect, more=types_of(skills))
+        super().__init__(hub or Hub(topics), interfaces, dialect=dialect)
+        offer_skills(self, skills)
         self._drives = drives or Drives(robot)
         self._robot = robot
-        self._sources = Sources(robot, self.hub, dialect=dialect)
+        self._sources = Sources(robot, self.hub, dialect=dialect, skilled=skilled)
         self._navigation: Nav2 | MoveBase
         self._tasks: TaskGroup
         self._feedback_due_s = self._status_due_s = 0.0
