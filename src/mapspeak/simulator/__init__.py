@@ -1,6 +1,6 @@
 """A world with one robot, stepped by hand: no clock, no network, no port."""
 
-from mapspeak.simulator.camera.camera import HORIZONTAL_FOV_RAD
+from mapspeak.simulator.camera.camera import HORIZONTAL_FOV_RAD, measure_shares_in_view
 from mapspeak.simulator.robot.controller import KEEP_OFF_M
 from mapspeak.simulator.robot.equipment import Equipment
 from mapspeak.simulator.robot.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
@@ -17,7 +17,6 @@ from mapspeak.simulator.truth import (
     TrueFloor,
     Truth,
     is_in_sight,
-    measure_shares_in_view,
     slice_at_eye_level,
 )
 from mapspeak.simulator.worlds.world import (

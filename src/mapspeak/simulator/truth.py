@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.camera.camera import PinholeCamera
 from mapspeak.simulator.robot.gridmap import CELL_SIZE_M
 from mapspeak.simulator.robot.lidar import (
     BEAM_ANGLES_RAD,
@@ -228,18 +227,3 @@ def is_in_sight(
         if math.isinf(free_m) or free_m >= place.distance_to(part) - OWN_SIZE_M:
             return True
     return False
-
-
-def measure_shares_in_view(world: World, pose: Pose) -> dict[str, float]:
-    """Return the share of the camera's picture that each thing in it takes up, by its name.
-
-    Args:
-        pose: Where the robot stands, in the world's own frame.
-    """
-    view = PinholeCamera(world).observe(pose, width_px=320, height_px=240)
-    numbers, counts = np.unique(view.object_ids[view.object_ids >= 0], return_counts=True)
-    shares = counts / view.object_ids.size
-    return {
-        view.objects[number].name: float(share)
-        for number, share in zip(numbers, shares, strict=True)
-    }

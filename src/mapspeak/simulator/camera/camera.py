@@ -85,6 +85,21 @@ def _look_from(world_from_camera: Pose, width_px: int, height_px: int) -> Viewpo
     )
 
 
+def measure_shares_in_view(world: World, pose: Pose) -> dict[str, float]:
+    """Return the share of the camera's picture that each thing in it takes up, by its name.
+
+    Args:
+        pose: Where the robot stands, in the world's own frame.
+    """
+    view = PinholeCamera(world).observe(pose, width_px=320, height_px=240)
+    numbers, counts = np.unique(view.object_ids[view.object_ids >= 0], return_counts=True)
+    shares = counts / view.object_ids.size
+    return {
+        view.objects[number].name: float(share)
+        for number, share in zip(numbers, shares, strict=True)
+    }
+
+
 MAX_DETECTION_RANGE_M = 12.0
 SMALLEST_AREA_RATIO = 0.0006
 """The share of the picture that a thing must take up: 184 of 640 x 480 pixels."""
