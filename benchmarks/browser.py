@@ -23,6 +23,7 @@ from mapspeak.links.simulated import SoloRobot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.keys import PageKeys
 from mapspeak.server.view.serving import serve_view
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
@@ -82,7 +83,7 @@ async def _show(folder: Path, browser: str) -> list[Figure]:
                 is_ready.set()
 
             feeds = {"": ViewFeed(session, CallFeed())}
-            await serve_view(feeds, address, tell_token=lambda _: None, on_ready=tell)
+            await serve_view(feeds, address, keys=PageKeys(lambda _: None), on_ready=tell)
 
         tasks.start_soon(serve)
         await is_ready.wait()

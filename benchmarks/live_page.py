@@ -26,6 +26,7 @@ from mapspeak.robot import StampedPose
 from mapspeak.server.app import build_server
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.keys import PageKeys
 from mapspeak.server.view.serving import serve_view
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
@@ -132,7 +133,7 @@ async def serve(folder: Path) -> AsyncGenerator[tuple[RovingRobot, Client]]:
                 is_ready.set()
 
             feeds = {"": ViewFeed(session, calls)}
-            await serve_view(feeds, ADDRESS, tell_token=lambda _: None, on_ready=tell)
+            await serve_view(feeds, ADDRESS, keys=PageKeys(lambda _: None), on_ready=tell)
 
         tasks.start_soon(show)
         await is_ready.wait()

@@ -20,10 +20,11 @@ from mapspeak.safety import Guard
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.keys import PageKeys
 from mapspeak.server.view.serving import serve_view
 from mapspeak.session import Session
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 
 
 @dataclass
@@ -44,11 +45,12 @@ class Live:
     tokens: list[str]
     keys: dict[str, str] = field(default_factory=dict)
 
-    async def command(self, name: str, **body: object) -> httpx2.Response:
+    async def command(self, name: str, /, **body: object) -> httpx2.Response:
         return await self.http.post(f"/robots/robot/{name}", json=body, headers=self.keys)
 
-    async def unlock(self) -> None:
-        answer = await self.http.post("/unlock", json={"token": self.tokens[-1]})
+    async def unlock(self, name: str = "") -> None:
+        body = {"token": self.tokens[-1], "name": name}
+        answer = await self.http.post("/unlock", json=body)
         self.keys = {"x-mapspeak-key": answer.json()["key"]}
 
     @asynccontextmanager
@@ -104,7 +106,7 @@ async def serve_live(
     store = SemanticMapStore(folder / "m.yaml", map_id="two-rooms")
     session = session_type(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
     calls, tokens, is_ready = CallFeed(), list[str](), anyio.Event()
-    feeds = {"": ViewFeed(session, calls)}
+    feeds, keys = {"": ViewFeed(session, calls)}, PageKeys(tokens.append, wrong_s=0.0)
     with anyio.fail_after(PATIENCE_S):
         async with (
             anyio.create_task_group() as tasks,
@@ -116,7 +118,7 @@ async def serve_live(
                 def tell(_address: str) -> None:
                     is_ready.set()
 
-                await serve_view(feeds, address, tell_token=tokens.append, on_ready=tell)
+                await serve_view(feeds, address, keys=keys, on_ready=tell)
 
             tasks.start_soon(serve)
             await is_ready.wait()

@@ -2,9 +2,11 @@
 
 import io
 import json
+import re
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
@@ -23,6 +25,8 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.geometry import Pose
 from mapspeak.spatial.mapwriting import write_map
+
+DOCUMENT = re.compile(r'<script type="application/json" id="document">(.*?)</script>', re.DOTALL)
 
 ROOM = """
     ########
@@ -117,6 +121,12 @@ def write_picture(folder: Path, name: str, *, shade: int, size: tuple[int, int] 
     (folder / "pictures" / name).write_bytes(file.getvalue())
 
 
+def read_replay(page: Path) -> Any:  # noqa: ANN401 - JSON
+    """Gives the document that a replay shows."""
+    (told,) = DOCUMENT.findall(page.read_text(encoding="utf-8"))
+    return json.loads(told)
+
+
 @dataclass
 class Element:
     """An element of a page, with the text in it."""
@@ -149,7 +159,7 @@ class ReadPage(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         new = Element(tag, dict(attrs))
         self.elements.append(new)
-        if tag not in {"meta", "img", "input", "br"}:
+        if tag not in {"meta", "img", "input", "br", "link"}:
             self._open.append(new)
 
     def handle_endtag(self, tag: str) -> None:

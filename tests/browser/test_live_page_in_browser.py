@@ -1,7 +1,6 @@
 """The live page in a real browser: every button, hostile names, a phone, and its pictures."""
 
 import os
-import shutil
 import sys
 from collections.abc import AsyncGenerator
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -19,43 +18,18 @@ from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.simulator import Simulation, load_world
 
 playwright_api = pytest.importorskip("playwright.async_api")
+from browsing import KEEP, PATIENCE_MS, PHONE, PICTURES, browse  # noqa: E402 - needs Playwright
+
 expect = playwright_api.expect
 pytestmark = [pytest.mark.anyio, pytest.mark.browser]
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 HOSTILE = "<img src=x onerror=alert(1)><script>alert(2)</script>"
-PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
-KEEP = "MAPSPEAK_KEEP_PICTURES"
-"""Where this variable is set, pictures for the documents are taken anew."""
-PATIENCE_MS = 20_000
-PHONE = {"width": 390, "height": 800}
-DESK = {"width": 1280, "height": 800}
-
-
-@asynccontextmanager
-async def browse(
-    address: str, *, size: dict[str, int] = DESK, is_dark: bool = False
-) -> AsyncGenerator[Any]:
-    """Open the page, and fail where it runs into an error of its own."""
-    program = next(filter(None, map(shutil.which, BROWSERS)))
-    errors: list[str] = []
-    async with playwright_api.async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        scheme = "dark" if is_dark else "light"
-        page = await browser.new_page(viewport=size, color_scheme=scheme)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("dialog", lambda dialog: errors.append(dialog.message))
-        await page.goto(address)
-        await expect(page.locator("#map img").first).to_be_visible(timeout=PATIENCE_MS)
-        yield page
-        await browser.close()
-    assert errors == []
 
 
 async def unlock(page: Any, live: Live) -> None:  # noqa: ANN401 - a page of Playwright
     await page.fill("#token", live.tokens[-1])
     await page.click("#unlock button")
-    await expect(page.locator("body")).to_have_class("unlocked")
+    await expect(page.locator("#unlock")).to_be_hidden()
 
 
 async def test_the_buttons_that_make_a_robot_stand_need_no_token(tmp_path: Path) -> None:
@@ -81,7 +55,7 @@ async def test_a_key_stops_the_robot_but_not_while_typing(tmp_path: Path) -> Non
 
 async def test_who_has_the_token_releases_checks_and_drives(tmp_path: Path) -> None:
     async with serve_live(tmp_path) as live, browse(live.address) as page:
-        await page.fill("#token", "00000000")
+        await page.fill("#token", "0000-0000-0000")
         await page.click("#unlock button")
         await expect(page.locator("#said")).to_contain_text("That is not the token")
         await unlock(page, live)
@@ -96,6 +70,50 @@ async def test_who_has_the_token_releases_checks_and_drives(tmp_path: Path) -> N
         await expect(page.locator("#said")).to_contain_text("has begun")
         await expect(page.locator("#state")).to_contain_text("G1 to (")
     assert len(live.robot.goals) == 1
+
+
+async def test_a_click_on_what_lies_there_notes_closes_renames_and_forgets(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        await live.client.call_tool("look_at_map", {})
+        await unlock(page, live)
+        said, items = page.locator("#said"), page.locator("#items")
+
+        async def choose(item: str) -> None:
+            await page.locator("#index").evaluate("index => { index.open = true; }")
+            await items.get_by_role("button", name=item).first.click()
+
+        await choose("D1:")
+        await page.get_by_label("Close D1 until").last.fill("in 2h")
+        await page.get_by_role("button", name="Close D1 until").last.click()
+        await expect(said).to_contain_text("Noted as E1")
+        await live.client.call_tool("look_at_map", {})
+        await choose("closed by event E1")
+        await page.get_by_role("button", name="End E1").last.click()
+        await expect(said).to_contain_text("Ended")
+        await choose("R1:")
+        await page.get_by_label("Note this place as").last.fill("spill")
+        await page.get_by_role("button", name="Note this place as").last.click()
+        await expect(said).to_contain_text("'spill' is remembered")
+        await live.client.call_tool("look_at_map", {})
+        await choose("W1: spill")
+        await page.get_by_label("Rename to").last.fill(HOSTILE[:40])
+        await page.get_by_role("button", name="Rename to").last.click()
+        await expect(said).to_contain_text("is called '<img")
+        await choose("W1: <img")
+        await page.get_by_role("button", name="Forget W1").last.click()
+        await expect(said).to_contain_text("Forgotten")
+        await expect(items).not_to_contain_text("W1")
+
+
+async def test_another_page_is_told_what_a_person_does(tmp_path: Path) -> None:
+    async with (
+        serve_live(tmp_path) as live,
+        browse(live.address) as page,
+        browse(live.address) as other,
+    ):
+        await page.click("#stop")
+        await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
+        await expect(other.locator("#said")).to_have_text("a person: The robot was told to stop.")
 
 
 async def test_what_waits_is_approved_and_refused(tmp_path: Path) -> None:
@@ -119,9 +137,7 @@ async def test_calls_are_shown_as_the_client_was_answered(tmp_path: Path) -> Non
         await page.click("#calls summary")
         await expect(page.locator("#calls pre")).to_contain_text("Picture P1")
         picture = page.locator("#calls img")
-        await expect(picture).to_have_attribute(
-            "alt", "Picture 1 of 1 that look_through_camera answered with"
-        )
+        await expect(picture).to_have_attribute("alt", "Picture 1 of 1 of 1 look_through_camera")
 
 
 async def test_hostile_names_are_text_everywhere(tmp_path: Path) -> None:
@@ -132,7 +148,7 @@ async def test_hostile_names_are_text_everywhere(tmp_path: Path) -> None:
         await live.client.call_tool("look_at_map", {})
         await expect(page.locator("#calls li")).to_have_count(3)
         await page.locator("#calls summary").first.click()
-        await page.locator("path.leaflet-interactive").last.hover(force=True)
+        await page.locator("path.leaflet-interactive").last.dispatch_event("mouseover")
         await expect(page.locator("#calls")).to_contain_text("onerror")
         assert await page.locator("img[src=x]").count() == 0
 

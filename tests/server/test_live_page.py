@@ -2,9 +2,12 @@
 
 import io
 import json
+import math
+import re
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+import anyio
 import numpy as np
 import pytest
 from PIL import Image
@@ -15,6 +18,7 @@ from livepage import next_of, serve_live
 from mapspeak.errors import ConfigError, LinkError, MapError
 from mapspeak.robot import StampedPose
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
+from mapspeak.server.view.keys import PageKeys
 from mapspeak.server.view.serving import serve_view
 from mapspeak.session import Session
 
@@ -77,7 +81,7 @@ async def test_a_call_is_told_when_it_begins_and_with_its_answer_and_pictures(
         missing = await live.http.get("/robots/robot/calls/1/1")
     assert (begun["is_over"], ended["is_over"], ended["is_error"]) == (False, True, False)
     assert ended["text"] in str(result.content)
-    assert ended["n_pictures"] == 1
+    assert ended["pictures"] == ["calls/1/0"]
     assert picture.headers["content-type"] == "image/jpeg"
     assert missing.status_code == 404
 
@@ -296,6 +300,78 @@ async def test_a_refused_command_no_longer_waits(tmp_path: Path) -> None:
     assert not live.robot.goals
 
 
+async def test_a_person_closes_a_door_until_a_time_and_opens_it_again(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.client.call_tool("look_at_map", {})
+        assert (await live.command("close", place="D1")).status_code == 403
+        await live.unlock(name="Ada")
+        said = await live.command("close", place="D1", until="in 2h")
+        assert said.text.startswith("Noted as E1")
+        ways = await live.client.call_tool("navigate_to", {"place": "R1", "wait_s": 0})
+        assert ways.is_error
+        assert (await live.command("end", event="E1")).status_code == 200
+        driven = await live.client.call_tool("navigate_to", {"place": "R1", "wait_s": 0})
+    assert not driven.is_error
+    noted = [line for line in audit_of(tmp_path) if line.event == "memory"]
+    assert {line.client for line in noted} == {"Ada at the live page"}
+
+
+async def test_a_person_notes_renames_and_forgets_a_place(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.client.call_tool("look_at_map", {})
+        await live.unlock()
+        assert (await live.command("note", x=2.0, y=1.0, name="spill")).status_code == 200
+        assert (await live.command("rename", place="W1", name="old spill")).status_code == 200
+        (place,) = (await live.wait_for("overlay", "places"))["places"]
+        assert (place["name"], place["at"]) == ("old spill", [2.0, 1.0])
+        taken = await live.command("rename", place="W1", name="R2")
+        unknown = await live.command("rename", place="W9", name="other")
+        assert (taken.status_code, unknown.status_code) == (409, 409)
+        assert (await live.command("forget", what="W1")).status_code == 200
+        remembered = await live.client.call_tool("get_semantic_data", {})
+    assert remembered.structured_content["waypoints"] == []
+
+
+async def test_a_policy_that_lets_nothing_change_holds_for_people_too(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path, Policy(is_read_only=True))
+    async with serve_live(tmp_path, guard=guard) as live:
+        await live.unlock()
+        said = await live.command("note", x=2.0, y=1.0, name="spill")
+    assert said.status_code == 409
+
+
+async def test_what_a_person_does_is_told_at_every_page(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, live.hear() as one, live.hear() as other:
+        await live.unlock(name="Ada\n<b>")
+        await live.command("hold")
+        words = [await next_of(page, "word") for page in (one, other)]
+    assert [word["said"] for word in words] == [
+        "Ada <b>: The robot was told to stop, and is held."
+    ] * 2
+
+
+async def test_two_people_command_each_in_their_own_name(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.unlock(name="Ada")
+        ada = live.keys
+        await live.unlock(name="Ben")
+        await live.command("hold")
+        live.keys = ada
+        await live.command("release")
+    clients = [line.client for line in audit_of(tmp_path) if line.event in ("stop", "release")]
+    assert clients[0] == "Ben at the live page"
+    assert clients[-1] == "Ada at the live page"
+
+
+async def test_the_cone_of_the_camera_is_as_wide_as_its_picture_told(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        assert (await live.wait_for("robot", "pose"))["camera_fov_deg"] is None
+        await live.http.get("/robots/robot/camera")
+        told = await live.wait_for("robot", "camera_fov_deg")
+    picture = await live.robot.fetch_picture()
+    assert told["camera_fov_deg"] == round(math.degrees(picture.horizontal_fov_rad), 1)
+
+
 # --- who must be kept out --------------------------------------------------------------------
 
 
@@ -308,12 +384,31 @@ async def test_a_token_is_good_once(tmp_path: Path) -> None:
     assert len(live.tokens) == 2
 
 
-async def test_who_guesses_tokens_is_not_heard_any_more(tmp_path: Path) -> None:
+async def test_wrong_tokens_lock_nobody_out(tmp_path: Path) -> None:
     async with serve_live(tmp_path) as live:
-        for guess in range(20):
-            await live.http.post("/unlock", json={"token": f"{guess:08d}"})
-        answer = await live.http.post("/unlock", json={"token": live.tokens[-1]})
-    assert answer.status_code == 403
+        for guess in range(40):
+            wrong = await live.http.post("/unlock", json={"token": f"{guess:012d}"})
+            assert wrong.status_code == 403
+        await live.unlock()
+        assert (await live.command("release")).status_code == 200
+
+
+async def test_a_token_is_too_long_to_guess_and_is_typed_with_or_without_dashes(
+    tmp_path: Path,
+) -> None:
+    async with serve_live(tmp_path) as live:
+        token = live.tokens[-1]
+        assert re.fullmatch(r"([2-9a-z]{4}-){2}[2-9a-z]{4}", token)
+        typed = {"token": f" {token.replace('-', '').upper()} "}
+        answer = await live.http.post("/unlock", json=typed)
+    assert answer.status_code == 200
+
+
+async def test_the_answer_to_a_wrong_token_is_slow() -> None:
+    keys = PageKeys(lambda _: None, wrong_s=3600.0)
+    with anyio.move_on_after(0.05) as waiting:
+        await keys.unlock("wrong")
+    assert waiting.cancelled_caught
 
 
 @pytest.mark.parametrize(
@@ -352,6 +447,7 @@ async def test_no_other_page_frames_this_one_and_no_foreign_script_runs_in_it(
         "/page/nothing.js",
         "/robots/other/events",
         "/robots/robot/tiles/0/99/x.png",
+        "/robots/robot/tiles/0/0/another.png",
     ],
 )
 async def test_only_the_files_of_the_page_are_given_out(tmp_path: Path, path: str) -> None:
@@ -391,7 +487,7 @@ async def test_hostile_names_come_as_data(tmp_path: Path) -> None:
 @pytest.mark.parametrize("address", ["0.0.0.0:8767", "192.0.2.7:80", "[::]:8767"])
 async def test_the_page_is_for_this_machine_alone(address: str) -> None:
     with pytest.raises(ConfigError, match="SSH tunnel"):
-        await serve_view({}, address, tell_token=lambda _: None)
+        await serve_view({}, address, keys=PageKeys(lambda _: None))
 
 
 async def test_a_page_that_reads_nothing_costs_the_others_nothing(tmp_path: Path) -> None:

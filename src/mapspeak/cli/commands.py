@@ -25,6 +25,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "serve": ("serving:serve", "offer a robot to a language model, over MCP"),
     "simulate": ("simulating:simulate", "offer the simulated robot to any rosbridge client"),
     "stop": ("operating:stop", "stop every robot that is served from here, and hold it"),
+    "view": ("viewing:view", "show a running server in the browser, or replay what is over"),
 }
 """Where each command is, and what it does; a module is imported when its command is wanted."""
 

@@ -34,7 +34,7 @@ from mapspeak.cli.options import (
 )
 from mapspeak.cli.robots import RobotChoice
 from mapspeak.cli.starting import RobotOptions, RobotStart, open_session, read_starts
-from mapspeak.cli.viewing import VIEW_OPTION, show_live, watch_calls
+from mapspeak.cli.viewing import VIEW_OPTION, make_page
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
@@ -220,9 +220,9 @@ async def _serve(options: ServeOptions) -> None:
             for name, start in options.robots.items()
         }
         call_log = None if options.call_log is None else CallLog(options.call_log)
-        feeds = watch_calls(sessions, call_log) if options.view is not None else {}
+        page = make_page(sessions, call_log, options.view, tells_token=options.http is not None)
         servers = {
-            name: _build_server(session, options, feeds[name].calls if feeds else call_log)
+            name: _build_server(session, options, page.feeds[name].calls)
             for name, session in sessions.items()
         }
         server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
@@ -236,8 +236,7 @@ async def _serve(options: ServeOptions) -> None:
                 tasks.start_soon(session.keep_watch)
                 tasks.start_soon(each.keep_skills)
             try:
-                if options.view is not None:
-                    await tasks.start(show_live, feeds, options.view)
+                await tasks.start(page.serve)
                 what = ", ".join(start.choice.shown for start in options.robots.values())
                 if options.http is None:
                     _tell_typist(what)

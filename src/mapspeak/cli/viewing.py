@@ -1,14 +1,27 @@
-"""The live page of served robots, and who is told of it."""
+"""`mapspeak view`, and the live page of served robots."""
 
+import getpass
+import socket
+import sys
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import anyio
 import click
 from anyio.abc import TaskStatus
 
+from mapspeak.cli.options import CONTROL_OPTION, FILE, control_folder, usual_modes
+from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.installation import shell_command
+
 if TYPE_CHECKING:
     from mapspeak.server.calllog import CallLog
+    from mapspeak.server.view.desk import ViewDesk, ViewRequest
     from mapspeak.server.view.feed import ViewFeed
+    from mapspeak.server.view.keys import PageKeys
     from mapspeak.session import Session
 
 DEFAULT_VIEW = "127.0.0.1:8767"
@@ -18,35 +31,224 @@ VIEW_OPTION = click.option(
     flag_value=DEFAULT_VIEW,
     metavar="[HOST:PORT]",
     help=f"A live page for a browser on this machine: map, camera, calls, stop, approval; at "
-    f"{DEFAULT_VIEW} unless said otherwise.",
+    f"{DEFAULT_VIEW} unless said otherwise. `mapspeak view` opens one for any running server.",
 )
+LOOK_S = 0.3
+"""Wall time between two looks for somebody who asks for the page."""
 
 
-def watch_calls(
-    sessions: "Mapping[str, Session]", call_log: "CallLog | None"
-) -> "dict[str, ViewFeed]":
-    """Return what the live page is told of each robot and the calls for it."""
-    from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - only for the live page
-    from mapspeak.server.view.feed import ViewFeed  # noqa: PLC0415 - only for the live page
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LivePage:
+    """The live page of a server: there from the start, or once somebody asks for it.
 
-    return {name: ViewFeed(session, CallFeed(call_log)) for name, session in sessions.items()}
-
-
-async def show_live(
-    feeds: "Mapping[str, ViewFeed]", address: str, *, task_status: TaskStatus[None]
-) -> None:
-    """Serve the live page until cancelled; tell its address and its token on the terminal.
-
-    Raises:
-        ConfigError: It cannot be served there.
+    Attributes:
+        feeds: What it shows, by the robot's name.
+        address: Where it is; None for the usual place once it is asked for.
+        desk: Where people ask for it.
+        keys: Who may command from it.
     """
-    from mapspeak.server.view.serving import serve_view  # noqa: PLC0415 - only for the live page
 
-    def tell(url: str) -> None:
-        click.echo(f"mapspeak: live page at {url}", err=True)
-        task_status.started()
+    feeds: "Mapping[str, ViewFeed]"
+    address: str | None
+    desk: "ViewDesk"
+    keys: "PageKeys"
+    _urls: list[str] = field(default_factory=list)
+
+    async def serve(self, *, task_status: TaskStatus[None]) -> None:
+        """Serve it until cancelled.
+
+        Raises:
+            ConfigError: It cannot be served where it was wanted.
+        """
+        from mapspeak.server.view.serving import serve_view  # noqa: PLC0415 - only for the page
+
+        is_wanted = anyio.Event()
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(self._answer, is_wanted)
+            if self.address is None:
+                task_status.started()
+                await is_wanted.wait()
+
+            def tell(url: str) -> None:
+                self._urls.append(url)
+                if self.address is not None:
+                    click.echo(f"mapspeak: live page at {url}", err=True)
+                    task_status.started()
+
+            where = self.address or _find_free(DEFAULT_VIEW)
+            await serve_view(self.feeds, where, keys=self.keys, on_ready=tell)
+
+    async def _answer(self, is_wanted: anyio.Event) -> None:
+        """Tell those who ask where the page is, once it is there."""
+        robots = ", ".join(feed.session.robot.description.name for feed in self.feeds.values())
+        while True:
+            for request in self.desk.find_requests():
+                is_wanted.set()
+                if self._urls:
+                    self.desk.answer(request, self.keys, robots=robots, url=self._urls[-1])
+            await anyio.sleep(LOOK_S)
+
+
+def _find_free(address: str) -> str:
+    """Return an address, or another port there where a program has it."""
+    host, _, port = address.rpartition(":")
+    for wanted in (int(port), 0):
+        try:
+            with socket.create_server((host, wanted)) as free:
+                return f"{host}:{free.getsockname()[1]}"
+        except OSError:
+            continue
+    return address
+
+
+def make_page(
+    sessions: "Mapping[str, Session]",
+    call_log: "CallLog | None",
+    address: str | None,
+    *,
+    tells_token: bool,
+) -> LivePage:
+    """Return the live page of some robots.
+
+    Args:
+        sessions: By the robots' names.
+        call_log: Where calls are written as well.
+        address: Where the page is wanted; None for nowhere yet.
+        tells_token: The terminal is a person's own, and no client's log.
+    """
+    from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.view.desk import ViewDesk  # noqa: PLC0415
+    from mapspeak.server.view.feed import ViewFeed  # noqa: PLC0415
+    from mapspeak.server.view.keys import PageKeys  # noqa: PLC0415
 
     def tell_token(token: str) -> None:
-        click.echo(f"mapspeak: token to command from the live page, once: {token}", err=True)
+        if address is not None and tells_token:
+            click.echo(f"mapspeak: token to command from the live page, once: {token}", err=True)
 
-    await serve_view(feeds, address, tell_token=tell_token, on_ready=tell)
+    guards = [session.guard for session in sessions.values() if session.guard is not None]
+    return LivePage(
+        feeds={name: ViewFeed(session, CallFeed(call_log)) for name, session in sessions.items()},
+        address=address,
+        desk=ViewDesk(guards[0].hold.folder if guards else control_folder(None)),
+        keys=PageKeys(tell_token),
+    )
+
+
+@click.command()
+@click.argument("run", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--map", "map_file", type=FILE, help="The map on which a log is shown: map_server's .yaml."
+)
+@CONTROL_OPTION
+@click.option(
+    "--wait-s", default=4.0, show_default=True, help="How long to wait for servers to answer."
+)
+@click.option("--no-open", is_flag=True, help="Say where it is, and open no browser.")
+def view(
+    run: Path | None, map_file: Path | None, control: Path | None, wait_s: float, *, no_open: bool
+) -> None:
+    """Show a running server in the browser, or replay what is over.
+
+    RUN is a call log (--call-log), an audit log (--audit), or the folder of a demo, of an
+    evaluation or of one of its trials. Its replay is written beside it, as a page that needs no
+    server. Without RUN every server of this machine is asked for its live page.
+    """
+    has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    if run is not None:
+        page = write_replay(run, map_file)
+        addresses = {str(page): page.resolve().as_uri()}
+    else:
+        addresses = _ask_servers(control_folder(control), wait_s, with_key=has_terminal)
+    for said, url in addresses.items():
+        click.echo(said)
+        if has_terminal and not no_open:
+            click.launch(url)
+
+
+def write_replay(run: Path, map_file: Path | None) -> Path:
+    """Write the replay of a log, a trial or a whole run, and return its page.
+
+    Raises:
+        ConfigError: It is none of these, or its page cannot be written.
+    """
+    if not run.exists():
+        raise ConfigError(f"There is no {run}.", hint="Name the file of a log, or a run's folder.")
+    with usual_modes():
+        try:
+            return _write_log(run, map_file) if run.is_file() else _write_run(run)
+        except OSError as error:
+            raise ConfigError(
+                f"The replay cannot be written: {error}.", hint="Check who may write there."
+            ) from error
+
+
+def _write_log(log: Path, map_file: Path | None) -> Path:
+    from mapspeak.server.view.pages import build_replay_page  # noqa: PLC0415 - heavy
+    from mapspeak.server.view.replay import replay_log  # noqa: PLC0415
+    from mapspeak.spatial.mapfiles import load_map  # noqa: PLC0415
+
+    grid = None if map_file is None else load_map(map_file).grid
+    page = log.with_suffix(".html")
+    page.write_bytes(build_replay_page(f"mapspeak: {log.name}", replay_log(log, grid)))
+    return page
+
+
+def _write_run(folder: Path) -> Path:
+    from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.report.replay import REPLAY, ReplayWriter  # noqa: PLC0415
+    from mapspeak.evaluation.trials import RESULT, read_result, read_results  # noqa: PLC0415
+
+    if (folder / RESULT).exists():
+        result = read_result(folder / RESULT)
+        run = folder.resolve().parents[result.trial.id.count("/") + 1]
+        ReplayWriter(run).write(result)
+        return folder / REPLAY
+    results = read_results(folder)
+    if not results:
+        raise ConfigError(
+            f"{folder} holds no run of a demo or an evaluation.",
+            hint="Name the folder that was given as --out, or the file of a log.",
+        )
+    return write_page(folder, results)
+
+
+def _ask_servers(control: Path, wait_s: float, *, with_key: bool) -> dict[str, str]:
+    """Return the pages of running servers: what to say of each, and its address.
+
+    Raises:
+        MapspeakError: None has answered.
+    """
+    from mapspeak.server.view.desk import ViewRequest  # noqa: PLC0415 - heavy
+
+    try:
+        request = ViewRequest.leave(control, getpass.getuser())
+    except OSError as error:
+        raise ConfigError(
+            f"{control} cannot be written: {error.strerror}.", hint="Name the server's --control."
+        ) from error
+    try:
+        found = _wait_for_pages(request, wait_s)
+    finally:
+        request.withdraw()
+    if not found:
+        raise MapspeakError(
+            f"No server has answered within {wait_s:g} s.",
+            hint=f"Start one: {shell_command('serve --http --view')}; or name its --control.",
+        )
+    fragment = f"#key={request.key}" if with_key else ""
+    if not with_key:
+        click.echo(
+            "To look and to stop; in a terminal of yours it also lets you command.", err=True
+        )
+    return {f"{robots}: {url}{fragment}": f"{url}{fragment}" for url, robots in found.items()}
+
+
+def _wait_for_pages(request: "ViewRequest", wait_s: float) -> dict[str, str]:
+    """Return the pages that have answered when no more come, by their addresses."""
+    deadline_s, found = time.monotonic() + wait_s, dict[str, str]()
+    while time.monotonic() < deadline_s:
+        time.sleep(LOOK_S)
+        before, found = found, dict(request.answers())
+        if found and len(found) == len(before):
+            break
+    return found

@@ -1,4 +1,3 @@
-from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -22,6 +21,7 @@ from reportmaking import (
     make_result,
     make_trial,
     make_turns,
+    read_replay,
     write_course,
     write_picture,
     write_trial,
@@ -37,10 +37,15 @@ def page_of(run: Path) -> ReadPage:
     return ReadPage.of(write_page(run, read_results(run)))
 
 
-def replay_of(run: Path, number: int = 1, **changes: object) -> ReadPage:
-    """Writes the pages of a run and reads that of a trial."""
+def path_of_replay(run: Path, number: int = 1, **changes: object) -> Path:
+    """Writes the pages of a run and gives that of a trial."""
     page_of(run)
-    return ReadPage.of(trial_folder(run, make_trial(number, **changes)) / "replay.html")
+    return trial_folder(run, make_trial(number, **changes)) / "replay.html"
+
+
+def replay_of(run: Path) -> Any:  # noqa: ANN401 - JSON
+    """Writes the pages of a run and gives what the first trial's shows."""
+    return read_replay(path_of_replay(run))
 
 
 @pytest.fixture
@@ -54,27 +59,21 @@ def run(tmp_path: Path) -> Path:
     return run
 
 
-def test_every_id_is_there_once_and_every_reference_finds_one(run: Path) -> None:
-    replay = replay_of(run, 2)
-    ids = replay.values("id")
-    wanted = [value for value in replay.values("href", "for") if value.startswith("#")]
-    assert replay.is_whole
-    assert len(ids) == len(set(ids))
-    assert {unquote(value.removeprefix("#")) for value in wanted} <= set(ids)
-    assert "step-4" in ids
+def test_the_page_of_a_run_needs_nothing_and_runs_nothing(run: Path) -> None:
+    page = page_of(run)
+    assert not any("//" in v or v.startswith("/") for v in page.values("href", "src", "srcset"))
+    (policy,) = [v for v in page.values("content") if "default-src" in v]
+    assert policy.startswith("default-src 'none'; style-src 'sha256-")
+    assert {each.tag for each in page.elements} & {"link", "iframe", "object", "script"} == set()
+    assert page.is_whole
 
 
-def test_the_pages_need_nothing_from_elsewhere(run: Path) -> None:
-    for page in (page_of(run), replay_of(run)):
-        references = page.values("href", "src", "data", "poster", "action", "srcset")
-        assert references
-        assert not any("//" in value or value.startswith("/") for value in references)
-        (policy,) = [v for v in page.values("content") if "default-src" in v]
-        assert "default-src 'none'; img-src data: 'self' file:;" in policy
-        (style,) = page.all("style")
-        assert "url(" not in style.text
-        assert "@import" not in style.text
-        assert {each.tag for each in page.elements} & {"link", "iframe", "object", "base"} == set()
+def test_a_replay_loads_only_the_pictures_beside_it(run: Path) -> None:
+    text = path_of_replay(run).read_text(encoding="utf-8")
+    assert "default-src 'none'; img-src data: 'self' file:; style-src 'sha256-" in text
+    head = text.partition("<style>")[0]
+    assert "http:" not in head
+    assert "src=" not in head
 
 
 def test_hostile_text_is_shown_as_text(tmp_path: Path) -> None:
@@ -85,22 +84,23 @@ def test_hostile_text_is_shown_as_text(tmp_path: Path) -> None:
     write_course(tmp_path, trial, *turns)
     result = make_result(trial, prompt=HOSTILE, answer=HOSTILE, error=HOSTILE)
     write_result(tmp_path, result)
-    own = resources.files("mapspeak.evaluation.report") / "replay.js"
-    for page, n_times in ((page_of(tmp_path), 2), (replay_of(tmp_path, **names), 8)):
-        (script,) = page.all("script")
-        assert script.text == own.read_text("utf-8")
-        assert page.all("img") == []
-        assert page.text.count(HOSTILE) >= n_times
-        handlers = {name for each in page.elements for name in each.attributes if name[:2] == "on"}
-        assert handlers == set()
+    page = page_of(tmp_path)
+    assert page.text.count(HOSTILE) >= 2
+    assert page.all("img") == []
+    handlers = {name for each in page.elements for name in each.attributes if name[:2] == "on"}
+    assert handlers == set()
+    path = path_of_replay(tmp_path, **names)
+    assert "<script>alert" not in path.read_text(encoding="utf-8")
+    (step,) = read_replay(path)["steps"]
+    assert step["call"]["tool"] == HOSTILE
+    assert step["call"]["arguments"] == {HOSTILE: HOSTILE}
 
 
 def test_what_nobody_can_see_in_a_text_is_spelled_out(tmp_path: Path) -> None:
-    trial = make_trial(1)
-    write_trial(tmp_path, trial, answer="room \u202egnorw\x00")
-    text = replay_of(tmp_path).text
-    assert "room <U+202E>gnorw<U+0000>" in text
-    assert "\u202e" not in text
+    error = "room \u202egnorw\x00"
+    broken = make_result(make_trial(1), state=TrialState.CRASHED, error=error)
+    write_result(tmp_path, broken)
+    assert "room <U+202E>gnorw<U+0000>" in page_of(tmp_path).text
 
 
 def test_the_papers_figures_are_marked_as_the_papers(run: Path) -> None:
@@ -117,34 +117,41 @@ def test_a_script_beside_the_papers_models_is_called_one(run: Path) -> None:
 
 
 def test_a_replay_shows_where_the_robot_stood_at_every_step(run: Path) -> None:
-    steps = {each.attributes.get("id"): each for each in replay_of(run).all("li")}
-    first, last = (steps[f"step-{number}"].attributes for number in (1, 4))
-    # The map is 8 m by 4 m at a pixel per metre, and its picture counts v from the top.
-    assert (first["data-u"], first["data-v"]) == ("1.0", "2.5")
-    assert (last["data-u"], last["data-v"]) == ("5.0", "2.5")
+    steps = replay_of(run)["steps"]
+    assert [(s["pose"]["x"], s["pose"]["y"], s["at_s"], s["n_trail"]) for s in steps] == [
+        (1.0, 1.5, 0.0, 1),
+        (1.0, 1.5, 4.0, 3),
+        (1.0, 1.5, 4.0, 3),
+        (5.0, 1.5, 8.0, 6),
+    ]
 
 
-def test_a_replay_tells_every_call_and_answer_in_its_order(run: Path) -> None:
-    replay = replay_of(run)
-    told = ["Go to the smallest room.", 'look_at_map{"layers": ["rooms"]}', "Explored: 6.0 m2"]
-    places = [replay.text.index(each) for each in (*told, "I go there.")]
-    assert places == sorted(places)
+def test_a_replay_tells_every_call_with_its_answer_in_order(run: Path) -> None:
+    told = [(s["call"]["tool"], s["call"]["text"][:20]) for s in replay_of(run)["steps"]]
+    assert told == [
+        ("user", "Go to the smallest r"),
+        ("look_at_map", "Explored: 6.0 m2 of "),
+        ("agent", "I go there."),
+        ("agent", "I am there."),
+    ]
 
 
-def test_nothing_of_a_replay_is_hidden_from_those_without_scripts(run: Path) -> None:
-    page = replay_of(run)
-    assert not any("hidden" in each.attributes for each in page.elements)
-    assert page.all("button") == [], "the script makes its own"
+def test_a_replay_draws_the_map_with_its_rooms(run: Path) -> None:
+    told = replay_of(run)
+    assert (told["map"]["n_cols"], told["map"]["n_rows"]) == (8, 4)
+    ((name,),) = told["map"]["tiles"]
+    assert told["map"]["pictures"][name].startswith("data:image/png;base64,")
+    assert len(told["trail"]) == 6
 
 
 def test_every_trial_is_replayed_on_a_page_beside_its_pictures(run: Path) -> None:
     links = [unquote(v) for v in page_of(run).values("href") if v.endswith(".html")]
     assert len(links) == 2
     for link in links:
-        replay = ReadPage.of(run / link)
-        (back,) = [value for value in replay.values("href") if value.endswith("report.html")]
-        assert ((run / link).parent / back).resolve() == (run / "report.html").resolve()
-        assert replay.values("src") == ["pictures/003.png"]
+        told = read_replay(run / link)
+        back = (run / link).parent / told["back"]
+        assert back.resolve() == (run / "report.html").resolve()
+        assert told["steps"][1]["call"]["pictures"] == ["pictures/003.png"]
         assert (run / link).parent.joinpath("pictures/003.png").is_file()
 
 
@@ -153,10 +160,10 @@ def test_a_broken_conversation_is_told_and_the_rest_is_shown(run: Path) -> None:
     (folder / "turns.jsonl").write_text('{"role": 7}\n')
     (folder / "state.jsonl").write_text("no json\n")
     (folder / "map.pgm").write_text("no map")
-    replay = replay_of(run)
+    about = dict(replay_of(run)["about"])
     for name in ("turns.jsonl", "state.jsonl", "map.yaml"):
-        assert f"{name} cannot be read" in replay.text
-    assert "It stands in the toilet." in replay.text
+        assert f"{name} cannot be read" in about
+    assert "It stands in the toilet." in about["result"]
 
 
 def test_a_picture_elsewhere_is_not_looked_at(run: Path) -> None:
@@ -164,9 +171,9 @@ def test_a_picture_elsewhere_is_not_looked_at(run: Path) -> None:
     write_picture(run, "secret.png", shade=200)
     turns = (Turn(role="tool", pictures=("../../../../../../pictures/secret.png", "..")),)
     write_course(run, trial, *turns)
-    replay = replay_of(run)
-    assert "secret.png is missing" in replay.text
-    assert "The picture .. is missing" in replay.text
+    (step,) = replay_of(run)["steps"]
+    assert step["call"]["pictures"] == []
+    assert "2 of 2 pictures are missing" in step["call"]["text"]
 
 
 def test_a_broken_trial_says_in_the_list_what_broke_it(tmp_path: Path) -> None:

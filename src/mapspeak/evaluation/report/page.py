@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from mapspeak.evaluation.agents.finding import is_script
 from mapspeak.evaluation.report.html import Html, document, element, paragraph, table, text
-from mapspeak.evaluation.report.replay import PAGE, REPLAY, show_standing, write_replay
+from mapspeak.evaluation.report.replay import PAGE, REPLAY, ReplayWriter, say_standing
 from mapspeak.evaluation.scores.rows import TableRow, count_rows, wilson_interval
 from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, write_whole
 
@@ -46,8 +46,9 @@ def write_page(run: Path, results: Sequence[TrialResult]) -> Path:
         *_show_paper(rows),
         *_list_trials(results),
     )
+    writer = ReplayWriter(run)
     for result in results:
-        write_replay(run, result)
+        writer.write(result)
     write_whole(run / PAGE, page)
     return run / PAGE
 
@@ -105,7 +106,7 @@ def _list_trials(results: Iterable[TrialResult]) -> Iterator[Html]:
 
 
 def _line(result: TrialResult) -> list[Html]:
-    failure = result.score.failure
+    failure, (standing, kind) = result.score.failure, say_standing(result)
     link = quote(f"{TRIALS}/{result.trial.id}/{REPLAY}")
     # A trace ends with what went wrong.
     last = ((result.error or "").strip().splitlines() or [result.score.reason])[-1]
@@ -114,7 +115,7 @@ def _line(result: TrialResult) -> list[Html]:
         mistake = f"{mistake}, out of budget"
     return [
         element("td", {"class": "id"}, element("a", {"href": link}, text(result.trial.id))),
-        element("td", {}, show_standing(result)),
+        element("td", {}, element("span", {"class": f"word {kind}"}, text(standing))),
         _cell(mistake),
         _cell(last if len(last) <= MOST_SAID else f"{last[:MOST_SAID]}..."),
     ]

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
+from mapspeak.errors import SemanticMapError
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.store.memorystore import MemoryStore
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
@@ -59,6 +60,27 @@ def restore(store: MemoryStore, name: str) -> Forgotten:
         lambda place, each: name_key(place.name if each is None else each.label) == key,
         is_gone=False,
     )
+
+
+def rename_place(store: MemoryStore, name: str, *, to: str) -> None:
+    """Give a place another name; under its old one it is forgotten.
+
+    Raises:
+        SemanticMapError: There is no such place, or another one has that name.
+    """
+
+    def change(known: SemanticMap) -> Iterable[Waypoint]:
+        named = {name_key(place.name): place for place in known.waypoints}
+        place, taken = named.get(name_key(name)), named.get(name_key(to))
+        if place is None or place.is_gone:
+            raise SemanticMapError(f"Nothing is remembered as {name[:80]!r}.", hint="Look again.")
+        if taken is place:
+            return [replace(place, name=to)]
+        if taken is not None and not taken.is_gone:
+            raise SemanticMapError(f"Another place is called {to[:80]!r}.", hint="Choose a name.")
+        return [replace(place, name=to), replace(place, is_gone=True)]
+
+    store.write_all(change)
 
 
 def _mark(store: MemoryStore, is_meant: _Test, *, is_gone: bool = True) -> Forgotten:

@@ -3,7 +3,6 @@
 import base64
 import itertools
 import json
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from typing import Any
@@ -11,31 +10,16 @@ from typing import Any
 from mcp_types import ImageContent, TextContent
 
 from mapspeak.server.calllog import CallLog, CallNote
-from mapspeak.server.view.document import ViewPart
+from mapspeak.server.view.document import CallView
 
 MOST_CALLS = 100
+MOST_WITH_PICTURES = 30
+"""Calls whose pictures are kept, whether or not a page is open."""
 MOST_CHARACTERS = 20_000
 """Of one text; the rest is told to be cut."""
 MOST_OF_ARGUMENT = 2_000
 MOST_KEPT = 200_000
 """Characters of all calls together: a page is told all of them whenever it comes back."""
-
-
-class CallView(ViewPart):
-    """A call of a tool, or the beginning of one.
-
-    Attributes:
-        is_over: It has been answered.
-        n_pictures: How many came with it; each is fetched apart.
-    """
-
-    number: int
-    tool: str
-    arguments: dict[str, Any]
-    is_over: bool
-    is_error: bool = False
-    text: str = ""
-    n_pictures: int = 0
 
 
 class CallFeed:
@@ -50,7 +34,7 @@ class CallFeed:
         self._numbers = itertools.count(1)
         self._calls: dict[int, CallView] = {}
         self._n_characters: dict[int, int] = {}
-        self._pictures: dict[int, deque[ImageContent]] = {}
+        self._pictures: dict[int, list[ImageContent]] = {}
         self.tell: Callable[[CallView], None] = lambda _: None
 
     @property
@@ -86,13 +70,18 @@ class CallFeed:
             return begun.model_copy(update=ended)
         pictures = [part for part in answer.content if isinstance(part, ImageContent)]
         texts = [part.text for part in answer.content if isinstance(part, TextContent)]
-        self._pictures[begun.number] = deque(pictures)
+        if pictures:
+            self._pictures[begun.number] = pictures
+            for number in list(self._pictures)[:-MOST_WITH_PICTURES]:
+                del self._pictures[number]
         return begun.model_copy(
             update={
                 "is_over": True,
                 "is_error": bool(answer.is_error),
                 "text": _cut("\n".join(texts)),
-                "n_pictures": len(pictures),
+                "pictures": tuple(
+                    f"calls/{begun.number}/{index}" for index in range(len(pictures))
+                ),
             }
         )
 

@@ -11,13 +11,10 @@ import anyio
 from anyio.streams.memory import MemoryObjectReceiveStream, MemoryObjectSendStream
 
 from mapspeak.errors import MapspeakError
-from mapspeak.geometry import Pose
-from mapspeak.server.text.drives import say_end
-from mapspeak.server.text.wording import say_pose_doubt
-from mapspeak.server.view.calls import CallFeed, CallView
-from mapspeak.server.view.commands import PERSON
-from mapspeak.server.view.document import GridView, PoseView, ViewPart
+from mapspeak.server.view.calls import CallFeed
+from mapspeak.server.view.document import CallView, GridView, PoseView, RobotView
 from mapspeak.server.view.overlay import Overlay
+from mapspeak.server.view.robotlook import RobotLook
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
@@ -34,48 +31,25 @@ MOST_TRAIL = 4000
 logger = logging.getLogger(__name__)
 
 
-class DriveView(ViewPart):
-    """A drive, as it was heard of last."""
-
-    id: str
-    place: str
-    state: str
-    reason: str
-    goal: PoseView
-    path: list[tuple[float, float]]
-
-
-class RobotView(ViewPart):
-    """The robot as it is now.
+class ViewFeed:
+    """Watches one robot for the pages that show it; hardly looks while none does.
 
     Attributes:
-        doubt: Why it may be elsewhere; empty where it is not.
-        held_by: Who holds it, and why; None where nobody does.
-        waiting: What waits for a person's word, by the id to give it with.
+        robot: Looks at the robot itself.
+        people: The names of those who have commanded from a page.
     """
-
-    pose: PoseView | None
-    age_s: float
-    doubt: str
-    fault: str = ""
-    held_by: str | None = None
-    drive: DriveView | None = None
-    waiting: dict[str, str]
-
-
-class ViewFeed:
-    """Watches one robot for the pages that show it; hardly looks while none does."""
 
     def __init__(self, session: Session, calls: CallFeed) -> None:
         self.session = session
         self.calls = calls
-        self.grid: OccupancyGrid | None = None
+        self.robot = RobotLook(session)
+        self.people: set[str] = set()
+        self._grids: tuple[tuple[OccupancyGrid, GridView], ...] = ()
         self._pages: set[MemoryObjectSendStream[bytes]] = set()
         self._has_page = anyio.Event()
         self._map: GridView | None = None
         self._world: WorldModel | None = None
         self._overlay = Overlay()
-        self._path: tuple[str, list[tuple[float, float]]] = ("", [])
         self._trail: list[tuple[float, float]] = []
         self._robot: RobotView | None = None
         self._has_failed = False
@@ -122,9 +96,9 @@ class ViewFeed:
             self._has_failed = True
 
     def _hear_person(self) -> None:
-        """Let an open page be somebody who is there for a drive of its own; for no other drive."""
+        """Keep a drive alive that a person began here, while a page is open; no other drive."""
         drive = self.session.drives.under_way
-        if self._pages and drive is not None and drive.client == PERSON:
+        if self._pages and drive is not None and drive.client in self.people:
             with self.session.client_is_heard():
                 pass
 
@@ -145,18 +119,29 @@ class ViewFeed:
                 self._pages.discard(page)
                 page.close()
 
+    def find_grid(self, row: int, col: int, name: str) -> OccupancyGrid | None:
+        """Return the map that has such a tile: the latest, or the one before it."""
+        for grid, view in self._grids:
+            if row < len(view.tiles) and col < len(view.tiles[0]) and view.tiles[row][col] == name:
+                return grid
+        return None
+
+    def tell_word(self, said: str, *, page: str) -> None:
+        """Tell all pages what a person has done at one of them."""
+        self._tell(_event("word", {"said": said, "page": page}))
+
     def _tell_call(self, call: CallView) -> None:
         self._tell(_event("call", call.model_dump()))
 
     async def _look_at_map(self) -> None:
         """Tell what has changed of the map, and of what the tools have found on it."""
         try:
-            self.grid = await self.session.robot.fetch_map()
+            grid = await self.session.robot.fetch_map()
         except MapspeakError:
             return
-        grid = self.grid
         if (shown := await self.session.compute(partial(GridView.of, grid))) != self._map:
             self._map = shown
+            self._grids = (*self._grids[-1:], (grid, shown))
             self._tell(_event("map", shown.model_dump()))
         world = self.session.world
         if world is not None:
@@ -166,56 +151,19 @@ class ViewFeed:
                 self._tell(_event("overlay", overlay.model_dump()))
 
     async def _look_at_robot(self) -> None:
-        robot, guard = self.session.robot, self.session.guard
-        pose, age_s, doubt, fault = None, 0.0, "", ""
-        try:
-            stamped = await robot.fetch_pose()
-        except MapspeakError as error:
-            fault = str(error)
-        else:
-            pose, age_s = PoseView.of(stamped.pose), round(robot.now_s - stamped.stamp_s, 1)
-            doubt = say_pose_doubt(stamped.find_doubt(robot.now_s))
-            self._note_trail(stamped.pose)
-        shown = RobotView(
-            pose=pose,
-            age_s=age_s,
-            doubt=doubt,
-            fault=fault,
-            held_by=None if guard is None else guard.hold.read(),
-            drive=await self._describe_drive(),
-            waiting={} if guard is None else guard.approvals.room.list_waiting(),
-        )
+        shown = await self.robot.look()
+        if shown.pose is not None:
+            self._note_trail(shown.pose)
         if shown != self._robot:
             self._robot = shown
             self._tell(_event("robot", shown.model_dump()))
 
-    def _note_trail(self, pose: Pose) -> None:
+    def _note_trail(self, pose: PoseView) -> None:
         at = (round(pose.x, 2), round(pose.y, 2))
         last = self._trail[-1] if self._trail else None
         if last is None or abs(at[0] - last[0]) + abs(at[1] - last[1]) >= TRAIL_M:
             self._trail.append(at)
             del self._trail[:-MOST_TRAIL]
-
-    async def _describe_drive(self) -> DriveView | None:
-        drive, world = self.session.drives.latest, self.session.world
-        if drive is None:
-            return None
-        status = drive.final or drive.heard
-        path: list[tuple[float, float]] = []
-        if drive.final is None and world is not None:
-            if self._path[0] != drive.goal_id:
-                goal = drive.goal.point
-                way = await self.session.compute(lambda: world.distances.way_to(goal))
-                self._path = drive.goal_id, [(round(at.x, 2), round(at.y, 2)) for at in way or ()]
-            path = self._path[1]
-        return DriveView(
-            id=drive.goal_id,
-            place=drive.place,
-            state=status.state.value,
-            reason=say_end(status),
-            goal=PoseView.of(drive.goal),
-            path=path,
-        )
 
 
 def _event(kind: str, data: Any) -> bytes:  # noqa: ANN401 - JSON of any shape

@@ -1,10 +1,21 @@
 """Who may command from the page: who has read the server's own terminal."""
 
+import hashlib
 import secrets
 from collections.abc import Callable
 
-MOST_TRIES = 20
-"""Wrong tokens, after which none is taken any more until the server is started anew."""
+import anyio
+
+from mapspeak.memory.quoting import clean_line
+
+LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"
+"""None that is taken for another."""
+N_LETTERS = 12
+"""About 59 bits: too many to guess, so that wrong tokens need lock nobody out."""
+WRONG_S = 1.0
+"""How long the answer to a wrong token takes."""
+NOBODY = "a person"
+MOST_NAME = 40
 
 
 class PageKeys:
@@ -13,33 +24,41 @@ class PageKeys:
     A model that has a shell on the machine can ask the page for anything that needs no key.
 
     Args:
-        tell: Shows a token to whoever has the terminal.
+        tell: Shows a token on the terminal.
+        wrong_s: How long the answer to a wrong token takes.
     """
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
+    def __init__(self, tell: Callable[[str], None], *, wrong_s: float = WRONG_S) -> None:
         self._tell = tell
-        self._keys: set[str] = set()
-        self._n_wrong = 0
+        self._wrong_s = wrong_s
+        self._names: dict[str, str] = {}
         self._renew()
 
-    def unlock(self, token: str) -> str | None:
+    async def unlock(self, token: str, name: str = "") -> str | None:
         """Return a key for the token, which is used up then; None for a wrong one."""
-        if self._n_wrong >= MOST_TRIES or not _is_same(token.strip(), self._token):
-            self._n_wrong += 1
+        typed = token.strip().lower().replace("-", "")
+        if not secrets.compare_digest(typed.encode(), self._token.encode()):
+            await anyio.sleep(self._wrong_s)
             return None
         key = secrets.token_urlsafe(24)
-        self._keys.add(key)
+        self.admit(digest(key), name)
         self._renew()
         return key
 
-    def is_known(self, key: str) -> bool:
-        """Return True for a key that was given."""
-        return any(_is_same(key, known) for known in self._keys)
+    def admit(self, key_digest: str, name: str = "") -> None:
+        """Take a key that somebody made who can be trusted, by its digest."""
+        self._names[key_digest] = clean_line(name).strip()[:MOST_NAME] or NOBODY
+
+    def find_name(self, key: str) -> str | None:
+        """Return the name of the person who has a key; None for an unknown key."""
+        return self._names.get(digest(key))
 
     def _renew(self) -> None:
-        self._token = f"{secrets.randbelow(10**8):08d}"
-        self._tell(self._token)
+        self._token = "".join(secrets.choice(LETTERS) for _ in range(N_LETTERS))
+        parts = (self._token[at : at + 4] for at in range(0, N_LETTERS, 4))
+        self._tell("-".join(parts))
 
 
-def _is_same(given: str, known: str) -> bool:
-    return secrets.compare_digest(given.encode(), known.encode())
+def digest(key: str) -> str:
+    """Return what is kept of a key; looking it up tells nothing of the key by its time."""
+    return hashlib.sha256(key.encode()).hexdigest()

@@ -25,7 +25,7 @@ async def serve_view(
     feeds: Mapping[str, ViewFeed],
     address: str,
     *,
-    tell_token: Callable[[str], None],
+    keys: PageKeys,
     on_ready: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Serve the live page of some robots until cancelled.
@@ -33,7 +33,7 @@ async def serve_view(
     Args:
         feeds: Of each robot, by its name.
         address: HOST:PORT on this machine.
-        tell_token: Shows a token to whoever has the server's terminal.
+        keys: Who may command.
         on_ready: Called with the page's address once it answers.
 
     Raises:
@@ -46,7 +46,7 @@ async def serve_view(
             hint="Serve it on 127.0.0.1, and reach it from elsewhere through an SSH tunnel: "
             f"ssh -L {port}:127.0.0.1:{port} ROBOT.",
         )
-    site = HostGuard(build_site(feeds, PageKeys(tell_token)), find_security(host, port))
+    site = HostGuard(build_site(feeds, keys), find_security(host, port))
     config = uvicorn.Config(site, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     with listen(host, port) as listener:
         shown = f"[{host}]" if ":" in host else host

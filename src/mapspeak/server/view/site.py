@@ -1,12 +1,12 @@
 """The live page's own small web site: files, events, pictures, and a person's commands."""
 
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Mapping
 from http import HTTPStatus
-from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
+import anyio
 from pydantic import ValidationError
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -16,14 +16,15 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.server.view.commands import MapTarget, PersonCommands, Wish
+from mapspeak.server.view.commands import PersonCommands
 from mapspeak.server.view.feed import ViewFeed
-from mapspeak.server.view.keys import PageKeys
-from mapspeak.server.view.tiles import draw_tile, has_tile
+from mapspeak.server.view.keys import NOBODY, PageKeys
+from mapspeak.server.view.pages import LEAFLET, PAGE, link_page
+from mapspeak.server.view.tiles import draw_tile
 
 ONLY = "robot"
 """What the only robot is called in addresses."""
-TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".png": "image/png"}
+TYPES = {".js": "text/javascript", ".css": "text/css", ".png": "image/png"}
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -37,9 +38,10 @@ HEADERS = (
 )
 MOST_BYTES = 2_000
 """Of the body of a command."""
-FREE = frozenset({"stop", "hold", "check"})
+CHECK = "check"
+FREE = frozenset({"stop", "hold", CHECK})
 """Need no key: what makes a robot stand must never wait, and a check moves nothing."""
-KEY = "x-mapspeak-key"
+KEY, NAME_OF_PAGE = "x-mapspeak-key", "x-mapspeak-page"
 
 
 def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
@@ -49,13 +51,13 @@ def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
         Route("/", site.show_page),
         Route("/page/{file}", site.show_file),
         Route("/leaflet/{file}", site.show_leaflet),
-        Route("/leaflet/images/{file}", site.show_leaflet_image),
         Route("/robots", site.list_robots),
         Route("/robots/{robot}/events", site.stream),
         Route("/robots/{robot}/tiles/{row:int}/{col:int}/{name}.png", site.show_tile),
         Route("/robots/{robot}/camera", site.show_camera),
         Route("/robots/{robot}/calls/{number:int}/{index:int}", site.show_picture),
         Route("/unlock", site.unlock, methods=["POST"]),
+        Route("/stop-all", site.stop_all, methods=["POST"]),
         Route("/robots/{robot}/{command}", site.command, methods=["POST"]),
     ]
     return _SafeHeaders(Starlette(routes=routes))
@@ -66,26 +68,19 @@ class LiveSite:
 
     def __init__(self, feeds: Mapping[str, ViewFeed], keys: PageKeys) -> None:
         self._feeds = {name or ONLY: feed for name, feed in feeds.items()}
-        self._commands = {name: PersonCommands(feed.session) for name, feed in self._feeds.items()}
         self._keys = keys
-        self._page = resources.files(__package__).joinpath("page")
-        self._leaflet = resources.files("xstatic.pkg.leaflet").joinpath("data")
 
     async def show_page(self, _request: Request) -> Response:
         """Answer with the page."""
-        return _file(self._page, "index.html")
+        return Response(link_page(), media_type="text/html")
 
     async def show_file(self, request: Request) -> Response:
         """Answer with a file of the page."""
-        return _file(self._page, request.path_params["file"])
+        return _file(PAGE, request.path_params["file"])
 
     async def show_leaflet(self, request: Request) -> Response:
         """Answer with a file of Leaflet."""
-        return _file(self._leaflet, request.path_params["file"])
-
-    async def show_leaflet_image(self, request: Request) -> Response:
-        """Answer with a picture of Leaflet."""
-        return _file(self._leaflet.joinpath("images"), request.path_params["file"])
+        return _file(LEAFLET, request.path_params["file"])
 
     async def list_robots(self, _request: Request) -> Response:
         """Answer with the names of the robots."""
@@ -106,9 +101,10 @@ class LiveSite:
 
     async def show_tile(self, request: Request) -> Response:
         """Answer with a tile of the map; its name says what it shows, so it may be kept."""
-        feed, grid = self._find(request), self._find(request).grid
-        row, col = request.path_params["row"], request.path_params["col"]
-        if grid is None or not has_tile(grid, row, col):
+        feed, wanted = self._find(request), request.path_params
+        row, col = wanted["row"], wanted["col"]
+        grid = feed.find_grid(row, col, wanted["name"])
+        if grid is None:
             raise HTTPException(HTTPStatus.NOT_FOUND)
         png = await feed.session.compute(lambda: draw_tile(grid, row, col))
         kept = {"cache-control": "private, max-age=3600, immutable"}
@@ -116,13 +112,15 @@ class LiveSite:
 
     async def show_camera(self, request: Request) -> Response:
         """Answer with what the camera sees now."""
-        robot = self._find(request).session.robot
+        feed = self._find(request)
+        robot = feed.session.robot
         if not robot.description.has_camera:
             raise HTTPException(HTTPStatus.NOT_FOUND, "This robot has no camera.")
         try:
             picture = await robot.fetch_picture()
         except LinkError as error:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+        feed.robot.camera_fov_rad = picture.horizontal_fov_rad or feed.robot.camera_fov_rad
         fresh = {"cache-control": "no-store"}
         return Response(picture.data, media_type=picture.media_type, headers=fresh)
 
@@ -136,51 +134,60 @@ class LiveSite:
 
     async def unlock(self, request: Request) -> Response:
         """Give a key for the token that the server's terminal shows."""
-        token = await _read_body(request)
-        key = self._keys.unlock(str(token.get("token", "")))
+        body = await _read_body(request)
+        typed, name = (str(body.get(key, "")) for key in ("token", "name"))
+        key = await self._keys.unlock(typed, name)
         if key is None:
             return _say("That is not the token. A newer one may stand on the terminal.", 403)
         return JSONResponse({"key": key})
 
     async def command(self, request: Request) -> Response:
-        """Carry out a person's command, and say what came of it."""
-        self._find(request)
-        name = request.path_params["command"]
-        commands = self._commands[request.path_params["robot"]]
-        if name not in FREE and not self._keys.is_known(request.headers.get(KEY, "")):
+        """Carry out a person's command, and return what came of it."""
+        feed, name = self._find(request), request.path_params["command"]
+        person = self._keys.find_name(request.headers.get(KEY, ""))
+        if name not in FREE and person is None:
             return _say("Unlock the page first, with the token on the server's terminal.", 403)
+        commands = PersonCommands(feed, person or NOBODY)
+        if name not in commands.by_name:
+            raise HTTPException(HTTPStatus.NOT_FOUND)
         try:
-            said = await self._carry_out(name, commands, await _read_body(request))
+            said = await commands.carry_out(name, await _read_body(request))
         except ValidationError as error:
             return _say(f"Not understood: {error.errors(include_url=False)[0]['msg']}.", 422)
         except MapspeakError as error:
             return _say(str(error), 409)
+        if name != CHECK:
+            feed.tell_word(f"{person or NOBODY}: {said}", page=_name_page(request))
         return _say(said, 200)
 
-    async def _carry_out(self, name: str, commands: PersonCommands, body: dict[str, Any]) -> str:
-        plain: dict[str, Callable[[], Awaitable[str]]] = {
-            "stop": commands.stop,
-            "hold": commands.hold,
-            "release": commands.release,
-        }
-        if name in plain:
-            return await plain[name]()
-        match name:
-            case "check":
-                return await commands.check(MapTarget.model_validate(body))
-            case "drive":
-                return await commands.drive(MapTarget.model_validate(body))
-            case "approve":
-                return await commands.approve(Wish.model_validate(body))
-            case "refuse":
-                return await commands.refuse(Wish.model_validate(body))
-        raise HTTPException(HTTPStatus.NOT_FOUND)
+    async def stop_all(self, request: Request) -> Response:
+        """Stop every robot at once: one that does not answer holds up none of the others."""
+        person = self._keys.find_name(request.headers.get(KEY, "")) or NOBODY
+        said: dict[str, str] = {}
+
+        async def stop(name: str, feed: ViewFeed) -> None:
+            try:
+                said[name] = await PersonCommands(feed, person).carry_out("stop", {})
+            except MapspeakError as error:
+                said[name] = str(error)
+            feed.tell_word(f"{person}: {said[name]}", page=_name_page(request))
+
+        async with anyio.create_task_group() as tasks:
+            for name, feed in self._feeds.items():
+                tasks.start_soon(stop, name, feed)
+        text = " ".join(f"{name}: {said[name]}" for name in self._feeds)
+        return _say(text, 409 if "NOT STOPPED" in text else 200)
 
     def _find(self, request: Request) -> ViewFeed:
         feed = self._feeds.get(request.path_params["robot"])
         if feed is None:
             raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such robot.")
         return feed
+
+
+def _name_page(request: Request) -> str:
+    """Return what a page calls itself, so that it is not told of its own commands."""
+    return request.headers.get(NAME_OF_PAGE, "")[:40]
 
 
 def _file(folder: Traversable, name: str) -> Response:

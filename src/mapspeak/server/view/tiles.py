@@ -20,11 +20,6 @@ def name_tiles(grid: OccupancyGrid) -> list[list[str]]:
     ]
 
 
-def has_tile(grid: OccupancyGrid, row: int, col: int) -> bool:
-    """Return True for a tile of the map."""
-    return 0 <= row < _count(grid.n_rows) and 0 <= col < _count(grid.n_cols)
-
-
 def draw_tile(grid: OccupancyGrid, row: int, col: int) -> bytes:
     """Return a tile as PNG, a pixel a cell, the row farthest from the origin on top.
 

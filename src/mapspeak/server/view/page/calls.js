@@ -1,23 +1,24 @@
-// The calls of tools, as their client was answered.
+// What was said: calls of tools, as their client was answered, and in a replay all else too.
 // @ts-check
+"use strict";
 
-const MOST = 100;
+const MOST_CALLS = 100;
 
 /**
  * @typedef {{number: number, tool: string, arguments: object, is_over: boolean, is_error: boolean,
- *   text: string, n_pictures: number}} Call
+ *   text: string, pictures: string[], note?: string}} Call
  */
 
-export class Calls {
+class Calls {
   /**
    * @param {HTMLElement} list
-   * @param {HTMLElement} count
-   * @param {string} base address of the robot
+   * @param {{address?: (picture: string) => string, isNewestFirst?: boolean, most?: number}} options
    */
-  constructor(list, count, base) {
+  constructor(list, { address = (picture) => picture, isNewestFirst = true, most = MOST_CALLS } = {}) {
     this.list = list;
-    this.count = count;
-    this.base = base;
+    this.address = address;
+    this.isNewestFirst = isNewestFirst;
+    this.most = most;
     /** @type {Map<number, HTMLLIElement>} */
     this.rows = new Map();
   }
@@ -36,7 +37,7 @@ export class Calls {
       row = document.createElement("li");
       row.append(document.createElement("details"));
       this.rows.set(call.number, row);
-      this.list.prepend(row);
+      if (this.isNewestFirst) this.list.prepend(row); else this.list.append(row);
     }
     const details = /** @type {HTMLDetailsElement} */ (row.firstChild);
     details.className = call.is_over ? (call.is_error ? "failed" : "") : "running";
@@ -46,8 +47,7 @@ export class Calls {
     };
     details.ontoggle = fill;
     fill();
-    this.count.textContent = String(call.number);
-    for (const number of [...this.rows.keys()].sort((a, b) => a - b).slice(0, -MOST)) {
+    for (const number of [...this.rows.keys()].sort((a, b) => a - b).slice(0, -this.most)) {
       this.rows.get(number)?.remove();
       this.rows.delete(number);
     }
@@ -57,23 +57,37 @@ export class Calls {
   summary(call) {
     const summary = document.createElement("summary");
     const told = document.createElement("code");
-    told.textContent = Object.entries(call.arguments)
-      .map(([name, value]) => `${name}=${JSON.stringify(value)}`).join(", ");
+    told.textContent = legible(Object.entries(call.arguments)
+      .map(([name, value]) => `${name}=${JSON.stringify(value)}`).join(", "));
     const state = call.is_over ? (call.is_error ? " failed" : "") : " …";
-    summary.append(`${call.number} ${call.tool} `, told, state);
+    const note = document.createElement("small");
+    note.textContent = legible(call.note ?? "");
+    summary.append(legible(`${call.number} ${call.tool} `), told, state, " ", note);
     return summary;
   }
 
   /** @param {Call} call */
   answer(call) {
     const text = document.createElement("pre");
-    text.textContent = call.text;
-    const pictures = Array.from({ length: call.n_pictures }, (_, index) => {
-      const picture = new Image();
-      picture.src = `${this.base}/calls/${call.number}/${index}`;
-      picture.alt = `Picture ${index + 1} of ${call.n_pictures} that ${call.tool} answered with`;
-      return picture;
-    });
-    return [text, ...pictures];
+    text.textContent = legible(call.text);
+    text.dir = "auto";
+    const n_pictures = call.pictures.length;
+    const pictures = call.pictures.map((name, index) =>
+      showPicture(this.address(name), `Picture ${index + 1} of ${n_pictures} of ${call.number} ${call.tool}`));
+    return call.text ? [text, ...pictures] : pictures;
   }
+}
+
+/** Return a picture that leads to itself in full size. @param {string} address @param {string} alt */
+function showPicture(address, alt) {
+  const picture = new Image();
+  picture.src = address;
+  picture.alt = alt;
+  picture.loading = "lazy";
+  if (address.startsWith("data:")) return picture;
+  const link = document.createElement("a");
+  link.href = address;
+  link.target = "_blank";
+  link.append(picture);
+  return link;
 }

@@ -1,31 +1,56 @@
-// The map: tiles of the grid, and all that lies on it.
+// The map: tiles of the grid, and what lies on it. It is the same in the live page, in a chat and
+// in a replay; these differ in where tiles come from and in what a click does.
 // @ts-check
+"use strict";
 /* global L */
+
+/**
+ * What was clicked: a point of the map, and what lies there.
+ * @typedef {{x: number, y: number, at: {lat: number, lng: number}, item: Item | null}} Click
+ * @typedef {{kind: string, id: string, name?: string}} Item
+ */
 
 const COLOURS = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#cc79a7", "#d55e00"];
 const CONE_M = 3;
-const CONE_DEG = 35;
 const NAMES_FROM_PX_PER_M = 12;
 const TRAIL_M = 0.25;
 const MOST_TRAIL = 4000;
 
+/** Return an element of the page. @param {string} id */
+function byId(id) {
+  return /** @type {any} */ (document.getElementById(id));
+}
+
+// Control characters, and those that turn the direction of what follows.
+const INVISIBLE = /[\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\ufff0-\uffff]/g;
+
+/** Spell out what nobody can see in a text. @param {string} text */
+function legible(text) {
+  return text.replace(INVISIBLE, (found) =>
+    `<U+${found.charCodeAt(0).toString(16).toUpperCase().padStart(4, "0")}>`);
+}
+
 /** Return an element with text in it, which is never read as HTML. @param {string} text */
 function plain(text) {
   const element = document.createElement("span");
-  element.textContent = text;
+  element.textContent = legible(text);
   element.dir = "auto";
   return element;
 }
 
-export class LiveMap {
+class MapView {
   /**
    * @param {HTMLElement} element
-   * @param {string} base address of the robot
-   * @param {import("./commands.js").Commands} commands
+   * @param {{tile?: (row: number, col: number, name: string) => string,
+   *   onClick?: (click: Click) => void, index?: HTMLElement | null}} options tile tells where a
+   *   tile comes from that the map does not hold itself; index lists all that can be clicked
    */
-  constructor(element, base, commands) {
-    this.base = base;
-    this.commands = commands;
+  constructor(element, { tile = () => "", onClick = () => {}, index = null } = {}) {
+    this.index = index;
+    /** @type {{said: string, item: Item, at: number[]}[]} */
+    this.listed = [];
+    this.tile = tile;
+    this.onClick = onClick;
     this.origin = { x: 0, y: 0, yaw_deg: 0 };
     this.map = L.map(element, { crs: L.CRS.Simple, minZoom: -3, maxZoom: 8, zoomSnap: 0.25,
       attributionControl: false, zoomDelta: 0.5 });
@@ -43,9 +68,10 @@ export class LiveMap {
     this.track = [];
     this.trail = L.polyline([], { color: "#888", weight: 2 }).addTo(this.layers.trail);
     this.path = L.polyline([], { color: "#0072b2", weight: 3, dashArray: "6 6" }).addTo(this.layers.path);
+    this.goal = L.circleMarker([0, 0], { radius: 9, color: "#0072b2", weight: 3, fill: false, interactive: false });
     this.cone = L.polygon([], { color: "#d55e00", weight: 1, fillOpacity: 0.12 }).addTo(this.layers.robot);
     this.marker = this.makeRobot();
-    this.map.on("click", (/** @type {any} */ event) => this.ask(event.latlng));
+    this.map.on("click", (/** @type {any} */ event) => this.click(event.latlng, null));
     this.map.on("zoomend", () => this.showNames());
   }
 
@@ -89,7 +115,7 @@ export class LiveMap {
         const east = Math.min(west + side_m, grid.origin.x + width_m);
         const north = Math.min(south + side_m, grid.origin.y + height_m);
         const key = `${row} ${col} ${name} ${west} ${south}`;
-        const address = `${this.base}/tiles/${row}/${col}/${name}.png`;
+        const address = grid.pictures?.[name] ?? this.tile(row, col, name);
         fresh.set(key, this.tiles.get(key) ?? L.imageOverlay(address, [[south, west], [north, east]],
           { alt: "" }).addTo(this.tilePane));
       }));
@@ -108,40 +134,65 @@ export class LiveMap {
   showOverlay(overlay) {
     const { rooms, doors, frontiers, closed, places, things } = this.layers;
     for (const layer of [rooms, doors, frontiers, closed, places, things]) layer.clearLayers();
+    this.listed = [];
     overlay.regions.forEach((/** @type {any} */ region) => {
       const colour = COLOURS[Number(region.id.slice(1)) % COLOURS.length];
       const outlines = region.outlines.map((/** @type {number[][]} */ each) => [each.map((at) => this.place(at))]);
-      L.polygon(outlines, { color: colour, weight: 1, fillOpacity: 0.22,
-        dashArray: region.kind === "corridor" ? "6 4" : undefined })
-        .bindTooltip(plain(`${region.id}: ${region.kind.replace("_", " ")}, ${region.floor_m2} m²`), { sticky: true })
-        .addTo(rooms);
+      const shape = L.polygon(outlines, { color: colour, weight: 1, fillOpacity: 0.22,
+        dashArray: region.kind === "corridor" ? "6 4" : undefined });
+      this.put(shape, rooms, `${region.kind.replace("_", " ")}, ${region.floor_m2} m²`,
+        { kind: "room", id: region.id }, region.middle);
       this.name(region.id, region.middle, rooms);
     });
     overlay.doors.forEach((/** @type {any} */ door) =>
-      L.circleMarker(this.place(door.at), { radius: 4, color: "#e69f00", fillOpacity: 0.9 })
-        .bindTooltip(plain(`${door.id}: ${door.joins.join(", ")}; ${door.width_m} m wide`)).addTo(doors));
+      this.put(L.circleMarker(this.place(door.at), { radius: 4, color: "#e69f00", fillOpacity: 0.9 }), doors,
+        `${door.joins.join(", ")}; ${door.width_m} m wide`, { kind: "door", id: door.id }, door.at));
     overlay.frontiers.forEach((/** @type {any} */ frontier) => {
       frontier.border.forEach((/** @type {number[]} */ at) =>
         L.circleMarker(this.place(at), { radius: 1.5, stroke: false, fillColor: "#d55e00", fillOpacity: 0.8,
           interactive: false }).addTo(frontiers));
-      L.circleMarker(this.place(frontier.at), { radius: 5, color: "#d55e00" })
-        .bindTooltip(plain(`${frontier.id}: about ${frontier.promised_m2} m² to see`)).addTo(frontiers);
+      this.put(L.circleMarker(this.place(frontier.at), { radius: 5, color: "#d55e00" }), frontiers,
+        `about ${frontier.promised_m2} m² to see`, { kind: "frontier", id: frontier.id }, frontier.at);
     });
     overlay.closed.forEach((/** @type {any} */ area) =>
-      L.polygon(area.outlines.map((/** @type {number[][]} */ each) => each.map((at) => this.place(at))),
-        { color: "#c62828", fillOpacity: 0.25 }).bindTooltip(plain(area.title), { sticky: true }).addTo(closed));
+      this.put(L.polygon(area.outlines.map((/** @type {number[][]} */ each) => each.map((at) => this.place(at))),
+        { color: "#c62828", fillOpacity: 0.25 }), closed, area.title, { kind: "closed", id: area.event_id }, area.outlines[0][0]));
     overlay.places.forEach((/** @type {any} */ place) =>
-      L.circleMarker(this.place(place.at), { radius: 6, color: "#0072b2", fillOpacity: 0.5 })
-        .bindTooltip(plain(`${place.id}: ${place.name}`)).addTo(places));
+      this.put(L.circleMarker(this.place(place.at), { radius: 6, color: "#0072b2", fillOpacity: 0.5 }), places,
+        place.name, { kind: "place", id: place.id, name: place.name }, place.at));
     overlay.things.forEach((/** @type {any} */ thing) => {
       if (thing.radius_m) {
         L.circle(this.place(thing.at), { radius: thing.radius_m, color: "#cc79a7", weight: 1, fillOpacity: 0.1,
           interactive: false }).addTo(things);
       }
-      L.circleMarker(this.place(thing.at), { radius: 4, color: "#cc79a7", fillOpacity: 0.9 })
-        .bindTooltip(plain(`${thing.id}: ${thing.name}, within ${thing.radius_m} m`)).addTo(things);
+      this.put(L.circleMarker(this.place(thing.at), { radius: 4, color: "#cc79a7", fillOpacity: 0.9 }), things,
+        `${thing.name}, within ${thing.radius_m} m`, { kind: "thing", id: thing.id, name: thing.name }, thing.at);
     });
     this.showNames();
+    this.index?.replaceChildren(...this.listed.map(({ said, item, at }) => {
+      const [row, button] = [document.createElement("li"), document.createElement("button")];
+      button.append(plain(said));
+      button.addEventListener("click", () => {
+        const [lat, lng] = this.place(at);
+        this.map.panTo([lat, lng], { animate: false });
+        this.click({ lat, lng }, item);
+      });
+      row.append(button);
+      return row;
+    }));
+  }
+
+  /** Draw something with an id, which can be hovered over and clicked.
+   * @param {any} shape @param {any} layer @param {string} told @param {Item} item
+   * @param {number[]} at */
+  put(shape, layer, told, item, at) {
+    const said = item.id && item.kind !== "closed" ? `${item.id}: ${told}` : told;
+    this.listed.push({ said, item, at });
+    shape.bindTooltip(plain(said), { sticky: true }).addTo(layer);
+    shape.on("click", (/** @type {any} */ event) => {
+      L.DomEvent.stopPropagation(event);
+      this.click(event.latlng, item);
+    });
   }
 
   /** @param {string} text @param {number[]} at @param {any} layer */
@@ -161,41 +212,52 @@ export class LiveMap {
     this.trail.setLatLngs(this.track);
   }
 
-  /** Lengthen the trail as the server does, for a page that is left open. @param {number[]} at */
-  follow(at) {
+  /** Lengthen the trail as the server does, for a page that is left open. @param {any} robot */
+  follow(robot) {
+    const at = this.showRobot(robot);
     const last = this.track.at(-1);
-    if (last && Math.abs(at[0] - last[0]) + Math.abs(at[1] - last[1]) < TRAIL_M) return;
+    if (!at || last && Math.abs(at[0] - last[0]) + Math.abs(at[1] - last[1]) < TRAIL_M) return;
     this.track = [...this.track, at].slice(-MOST_TRAIL);
     this.trail.setLatLngs(this.track);
   }
 
   /** @param {any} robot */
-  showRobot(robot) {
-    const { pose, drive } = robot;
+  showRobot({ pose, drive, goal, camera_fov_deg: fov_deg }) {
+    const wanted = goal ?? (drive?.path.length ? drive.goal : null);
+    if (wanted) this.goal.setLatLng(this.place([wanted.x, wanted.y])).addTo(this.layers.path);
+    else this.goal.remove();
     this.path.setLatLngs((drive?.path ?? []).map((/** @type {number[]} */ at) => this.place(at)));
-    if (!pose) return;
+    if (!pose) return null;
     const at = this.place([pose.x, pose.y]);
     this.marker.setLatLng(at).addTo(this.layers.robot);
     const yaw_deg = pose.yaw_deg - this.origin.yaw_deg;
     if (this.arrow) this.arrow.style.transform = `rotate(${-yaw_deg}deg)`;
-    const rim = [-CONE_DEG, -CONE_DEG / 2, 0, CONE_DEG / 2, CONE_DEG].map((off) => {
-      const turn = (pose.yaw_deg + off) * Math.PI / 180;
+    const rim = [-1, -0.5, 0, 0.5, 1].map((share) => {
+      const turn = (pose.yaw_deg + share * fov_deg / 2) * Math.PI / 180;
       return this.place([pose.x + CONE_M * Math.cos(turn), pose.y + CONE_M * Math.sin(turn)]);
     });
-    this.cone.setLatLngs([at, ...rim]);
-    this.follow(at);
+    this.cone.setLatLngs(fov_deg ? [at, ...rim] : []);
+    return at;
   }
 
-  /** Ask what a person wants at a place. @param {{lat: number, lng: number}} latlng */
-  ask(latlng) {
-    const at = this.read(latlng);
-    const target = { x: Number(at.x.toFixed(2)), y: Number(at.y.toFixed(2)) };
-    const asked = document.createElement("div");
-    asked.className = "at";
-    const buttons = [this.commands.button("Check this goal", "check", target),
-      this.commands.button("Drive here", "drive", target)];
-    asked.append(plain(`x ${target.x}, y ${target.y}`), ...buttons);
-    for (const button of buttons) button.addEventListener("click", () => this.map.closePopup());
-    L.popup().setLatLng(latlng).setContent(asked).openOn(this.map);
+  /** Tell of a click. @param {{lat: number, lng: number}} at @param {Item | null} item */
+  click(at, item) {
+    const { x, y } = this.read(at);
+    this.onClick({ x: Number(x.toFixed(2)), y: Number(y.toFixed(2)), at, item });
+  }
+
+  /** Open a bubble. @param {{lat: number, lng: number}} at @param {HTMLElement} content */
+  ask(at, content) {
+    content.classList.add("at");
+    L.popup({ minWidth: 180 }).setLatLng(at).setContent(content).openOn(this.map);
+  }
+
+  /** Show a part of the map frame. @param {number[][]} points */
+  fit(points) {
+    if (points.length) this.map.fitBounds(points.map((at) => this.place(at)), { maxZoom: 5 });
+  }
+
+  closeBubble() {
+    this.map.closePopup();
   }
 }

@@ -1,0 +1,184 @@
+"""A replay as one document, and how it is made of a call log or an audit log."""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from mapspeak.errors import ConfigError, say_cause
+from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMap
+from mapspeak.safety import AuditLine, read_audit
+from mapspeak.server.view.document import CallView, GridView, PoseView, Spot, ViewPart
+from mapspeak.server.view.overlay import Overlay
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.recollection import Recollector
+
+RADIUS_M = 0.2
+"""Of a robot that nobody has told of; rooms do not depend on it."""
+
+
+class StepView(ViewPart):
+    """One thing that was said, and how the robot then stood.
+
+    Attributes:
+        at_s: Since the first.
+        pose: Where the robot stood; None where it is not known.
+        goal: Where it was sent.
+        n_trail: Points of the trail until then.
+    """
+
+    call: CallView
+    at_s: float
+    pose: PoseView | None = None
+    goal: PoseView | None = None
+    n_trail: int = 0
+
+
+class Replay(ViewPart):
+    """Everything that a replay shows.
+
+    Attributes:
+        about: What it is, as names and values.
+        back: Address of the page that lists others; empty where there is none.
+    """
+
+    about: Sequence[tuple[str, str]] = ()
+    back: str = ""
+    map: GridView | None = None
+    overlay: Overlay = Overlay()
+    trail: Sequence[Spot] = ()
+    steps: Sequence[StepView] = ()
+
+
+def show_map(grid: OccupancyGrid, memory: SemanticMap | None = None) -> tuple[GridView, Overlay]:
+    """Return a finished map as it is drawn, with its rooms and what is remembered on it."""
+    start = grid.bounds()[0]
+    world = WorldModel(
+        grid,
+        Pose(start.x, start.y),
+        memory or SemanticMap(),
+        radius_m=RADIUS_M,
+        recollector=Recollector(lambda: None),
+    )
+    _ = world.rooms
+    if memory is not None:
+        _ = world.recollection
+    return GridView.whole(grid), Overlay.of(world)
+
+
+def replay_log(path: Path, grid: OccupancyGrid | None = None) -> Replay:
+    """Return the replay of a call log or an audit log, whichever the file is.
+
+    Raises:
+        ConfigError: It cannot be read, or is neither.
+    """
+    first = next(iter(_read_lines(path)), None)
+    if first is None:
+        raise ConfigError(f"{path} is empty.", hint="Give a log in which something was noted.")
+    is_audit = "event" in first
+    steps = _steps_of_audit(read_audit(path)) if is_audit else _steps_of_calls(path)
+    shown, overlay = (None, Overlay()) if grid is None else show_map(grid)
+    told = list(steps)
+    return Replay(
+        about=[("log", path.name), ("kind", "audit log" if is_audit else "call log")],
+        map=shown,
+        overlay=overlay,
+        trail=[(step.pose.x, step.pose.y) for step in told if step.pose is not None],
+        steps=told,
+    )
+
+
+def _read_lines(path: Path) -> Iterator[Mapping[str, Any]]:
+    """Read JSON lines; a last one that was cut off by a crash is left out."""
+    try:
+        lines = path.read_text("utf-8", errors="replace").split("\n")
+    except OSError as error:
+        raise ConfigError(
+            f"{path} cannot be read: {say_cause(error)}.", hint="Give the file of a log."
+        ) from error
+    whole = [line for line in lines[:-1] if line] or [line for line in lines if line]
+    for number, line in enumerate(whole, start=1):
+        try:
+            read = json.loads(line)
+        except ValueError:
+            read = None
+        if not isinstance(read, dict):
+            raise ConfigError(
+                f"{path}, line {number} is no line of a log.",
+                hint="Give the file that was named with --call-log or --audit.",
+            )
+        yield read
+
+
+def _steps_of_calls(path: Path) -> Iterator[StepView]:
+    at_s, n_trail = 0.0, 0
+    for number, line in enumerate(_read_lines(path), start=1):
+        at_s += _number(line.get("wall_s")) or 0.0
+        pose = _find_pose(line.get("report"))
+        n_trail += pose is not None
+        pictures = [str(name) for name in line.get("pictures") or ()]
+        call = CallView(
+            number=number,
+            tool=str(line.get("tool", "")),
+            arguments=line.get("arguments") or {},
+            is_error=bool(line.get("is_error")),
+            text=str(line.get("text", "")),
+            pictures=tuple(locate_pictures(pictures, path.with_suffix(""))),
+        )
+        yield StepView(call=call, at_s=round(at_s, 2), pose=pose, n_trail=n_trail)
+
+
+def locate_pictures(names: Iterable[str], folder: Path) -> Iterator[str]:
+    """Return addresses of pictures in a folder beside the page.
+
+    A name may come from anywhere: what leads out of the folder, or is not there, is left out.
+    """
+    for name in names:
+        path = folder / name
+        if path.name == name and path.resolve().parent == folder.resolve() and path.is_file():
+            yield f"{quote(folder.name)}/{quote(name)}"
+
+
+def _find_pose(report: object) -> PoseView | None:
+    """Return where a report says that the robot was."""
+    if not isinstance(report, dict):
+        return None
+    told = report.get("robot") or report.get("pose")
+    if not isinstance(told, dict):
+        return None
+    numbers = [_number(told.get(name)) for name in ("x", "y", "yaw_deg")]
+    if None in numbers:
+        return None
+    x, y, yaw_deg = (number or 0.0 for number in numbers)
+    return PoseView(x=x, y=y, yaw_deg=yaw_deg)
+
+
+def _number(value: object) -> float | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number else None  # type: ignore[arg-type]  # checked just before
+
+
+def _steps_of_audit(lines: Iterable[AuditLine]) -> Iterator[StepView]:
+    begun: datetime | None = None
+    for number, line in enumerate(lines, start=1):
+        at = datetime.fromisoformat(line.wall_time)
+        begun = begun or at
+        goal = [_number(line.details.get(name)) for name in ("x", "y", "yaw_rad")]
+        x, y, yaw_rad = (value or 0.0 for value in goal)
+        said = [line.what if line.event == "decision" else "", line.verdict or line.event]
+        call = CallView(
+            number=number,
+            tool=line.tool or "mapspeak",
+            is_error=line.verdict == "refused",
+            text="\n".join(filter(None, [" -> ".join(filter(None, said)), line.said])),
+            note=f"{line.wall_time[:19]} {line.client} {line.robot}".strip(),
+        )
+        yield StepView(
+            call=call,
+            at_s=round((at - begun).total_seconds(), 2),
+            goal=None if None in goal else PoseView.of(Pose(x, y, yaw_rad)),
+        )

@@ -1,0 +1,94 @@
+"""Replays of call logs and audit logs."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from drawing import grid_from_text
+from fakes import FakeRobot, two_rooms
+from guarding import make_guard
+from mapspeak.errors import ConfigError, PolicyError
+from mapspeak.safety import Caller, Publish, calling
+from mapspeak.server.calllog import CallLog
+from mapspeak.server.view.replay import replay_log
+from served import connect
+
+ROOM = """
+    ########
+    #......#
+    #......#
+    ########
+"""
+
+
+@pytest.fixture
+async def calls(tmp_path: Path) -> Path:
+    """A call log of three calls."""
+    log = CallLog(tmp_path / "calls.jsonl")
+    async with connect(FakeRobot(two_rooms()), tmp_path, call_log=log) as client:
+        await client.call_tool("look_at_map", {})
+        await client.call_tool("get_robot_pose", {})
+        await client.call_tool("navigate_to", {"place": "R99"})
+    return log.path
+
+
+@pytest.mark.anyio
+async def test_a_call_log_is_replayed_with_pictures_and_poses(calls: Path) -> None:
+    told = replay_log(calls)
+    look, pose, refused = told.steps
+    assert look.call.pictures == ("calls/0001-0.png",)
+    assert (look.pose, refused.call.is_error) == (None, True)
+    assert pose.pose is not None
+    assert (pose.pose.x, pose.pose.y, pose.n_trail) == (1.5, 1.4, 1)
+    assert told.map is None
+
+
+@pytest.mark.anyio
+async def test_a_log_is_shown_on_a_map_that_is_named(calls: Path) -> None:
+    told = replay_log(calls, grid_from_text(ROOM, resolution_m=1.0))
+    assert told.map is not None
+    assert len(told.map.pictures or ()) == 1
+
+
+def test_an_audit_log_is_replayed_with_who_what_and_why(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path)
+    tf = Publish(topic="/tf", type="tf2_msgs/msg/TFMessage", message={})
+    with calling(Caller(client="tester", tool="publish")), pytest.raises(PolicyError):
+        guard.clear(tf, robot_s=2.0)
+    guard.note_event("stop", "stopped", robot_s=3.0)
+    refused, stopped = replay_log(tmp_path / "audit.jsonl").steps
+    assert (refused.call.tool, refused.call.is_error) == ("publish", True)
+    assert "tester" in refused.call.note
+    assert stopped.call.text == "stop\nstopped"
+
+
+def test_a_drive_of_an_audit_log_shows_where_it_was_sent(tmp_path: Path) -> None:
+    line = {"number": 1, "run": "r", "robot": "", "wall_time": "2026-11-25T10:00:00.000"}
+    line |= {"robot_s": 1.0, "event": "decision", "client": "c", "tool": "navigate_to"}
+    line |= {"kind": "drive", "what": "drive to R2", "verdict": "allowed", "said": ""}
+    later = {**line, "wall_time": "2026-11-25T10:00:07.500", "event": "ended", "details": {}}
+    line |= {"details": {"x": 2.0, "y": 1.0, "yaw_rad": 0.0}}
+    path = tmp_path / "audit.jsonl"
+    path.write_text(f"{json.dumps(line)}\n{json.dumps(later)}\n")
+    drive, ended = replay_log(path).steps
+    assert drive.goal is not None
+    assert (drive.goal.x, drive.goal.y) == (2.0, 1.0)
+    assert (ended.goal, ended.at_s) == (None, 7.5)
+
+
+@pytest.mark.parametrize("content", ["", "no json\n{}\n", "[1]\n{}\n"])
+def test_what_is_no_log_is_refused(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "log.jsonl"
+    path.write_text(content)
+    with pytest.raises(ConfigError):
+        replay_log(path)
+
+
+def test_pictures_that_lie_elsewhere_are_not_shown(tmp_path: Path) -> None:
+    (tmp_path / "secret.png").write_bytes(b"x")
+    line = {"tool": "look", "text": "", "pictures": ["../secret.png", "/etc/passwd", "none.png"]}
+    path = tmp_path / "log.jsonl"
+    path.write_text(json.dumps(line) + "\n")
+    (step,) = replay_log(path).steps
+    assert step.call.pictures == ()
