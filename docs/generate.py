@@ -2,7 +2,7 @@
 
 A table stands between `<!-- tools -->` and `<!-- /tools -->` in each document that has one, and
 likewise one for the messages of each group in `docs/howto/troubleshooting.md`;
-`docs/reference/tools.md` is written whole.
+`docs/reference/tools.md` and `docs/howto/missions-transcript.md` are written whole.
 """
 
 import ast
@@ -21,11 +21,13 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
+from missionscript import play_transcript
 
 __all__ = ["main", "write_documents"]
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "docs" / "reference" / "tools.md"
+TRANSCRIPT = ROOT / "docs" / "howto" / "missions-transcript.md"
 SNAPSHOT = ROOT / "tests" / "snapshots" / "tools.json"
 WITH_TABLES = (ROOT / "README.md",)
 TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
@@ -76,6 +78,7 @@ def write_documents() -> dict[Path, str]:
         documents[TROUBLES] = between.sub(lambda _, told=told: told, documents[TROUBLES])  # type: ignore[misc]
     documents[REFERENCE] = _reference(toolsets)
     documents[SNAPSHOT] = _snapshot(listed)
+    documents[TRANSCRIPT] = asyncio.run(play_transcript())
     return documents
 
 

@@ -170,10 +170,14 @@ class SkillProgress:
     Attributes:
         values: The latest feedback, by name.
         done_ratio: None where it is not known.
+        is_asking: It waits for somebody's answer.
+        account: What a mission has done so far, a step each.
     """
 
     values: Mapping[str, JsonValue] = field(default_factory=dict)
     done_ratio: float | None = None
+    is_asking: bool = False
+    account: tuple[str, ...] = ()
 
 
 OnProgress = Callable[[SkillProgress], None]

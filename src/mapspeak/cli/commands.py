@@ -24,6 +24,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "replay": ("operating:replay", "show an audit log: who wanted what, and what became of it"),
     "serve": ("serving:serve", "offer a robot to a language model, over MCP"),
     "simulate": ("simulating:simulate", "offer the simulated robot to any rosbridge client"),
+    "skills": ("skills:skills", "check, list and try what else a robot can do: skills.yaml"),
     "stop": ("operating:stop", "stop every robot that is served from here, and hold it"),
     "view": ("viewing:view", "show a running server in the browser, or replay what is over"),
 }

@@ -136,6 +136,13 @@ SKILL_OPTIONS = (
         help="Make tools of topics, services and actions of the robot while it "
         'offers them, such as "/gripper/*".',
     ),
+    click.option(
+        "--skills",
+        "skill_files",
+        type=FILE,
+        multiple=True,
+        help="skills.yaml: what else the robot can do, in its owner's words; each a tool.",
+    ),
 )
 
 GUARD_OPTIONS = (
@@ -161,9 +168,11 @@ class SkillChoice:
 
     Attributes:
         expose: Patterns of names of the robot that are tools.
+        skill_files: The owner's.
     """
 
     expose: tuple[str, ...] = ()
+    skill_files: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -115,7 +115,7 @@ class ToolChoice:
     callback=split_names,
     default=None,
     help="Groups of tools, comma-separated (default: look,places,drive,paper); others are "
-    "explore, routes, memory, ros and skills. +NAME adds one to the default.",
+    "explore, routes, memory, ros, skills and missions. +NAME adds one to the default.",
 )
 @click.option(
     "--tools", callback=split_names, default=None, help="Further single tools, comma-separated."
@@ -173,7 +173,7 @@ class ToolChoice:
 @add_options(GUARD_OPTIONS)
 @grouped("choice", partial(RobotChoice, robot=""), SIMULATION)
 @grouped("guard", GuardChoice, ("audit", "control"))
-@grouped("skills", SkillChoice, ("expose",))
+@grouped("skills", SkillChoice, ("expose", "skill_files"))
 def serve(
     robots: tuple[str, ...],
     robot_files: tuple[str, ...],
@@ -271,6 +271,7 @@ def _build_server(
     from mapspeak.server.app import DEFAULT_TOOLSETS, build_server  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.tools.ros.inquiry import require_ros  # noqa: PLC0415
+    from mapspeak.skills.owners.skillsfile import load_skills  # noqa: PLC0415
 
     chosen = options.tools
     added = tuple(name.removeprefix("+") for name in chosen.sets if name.startswith("+"))
@@ -286,6 +287,7 @@ def _build_server(
         representation=options.representation or Representation.PICTURE_TABLE,
         call_log=call_log,
         expose=options.skills.expose,
+        skills=[each for path in options.skills.skill_files for each in load_skills(path)],
     )
 
 

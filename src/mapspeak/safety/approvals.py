@@ -33,7 +33,8 @@ class Errand:
     def said(self) -> str:
         """The errand with its bounds, in words."""
         drives = "one drive" if self.n_drives == 1 else f"up to {self.n_drives} drives"
-        commands = f" and {self.n_commands} other commands" if self.n_commands else ""
+        n_others = f"{self.n_commands} other command{'s' if self.n_commands > 1 else ''}"
+        commands = f" and {n_others}" if self.n_commands else ""
         return f"{self.what}, {drives}{commands} within {self.duration_s:g} s"
 
 
@@ -112,6 +113,10 @@ class Errands:
         approved.n_left -= is_drive
         approved.n_commands_left -= not is_drive
         return approved.wish_id
+
+    def end(self, errand: Errand, *, client: str) -> None:
+        """Forget one: what is left of it covers nothing more."""
+        self._approved.pop((client, errand), None)
 
     def end_all(self) -> None:
         """Forget them: after a stop a person is asked again."""

@@ -219,7 +219,6 @@ class Guard:
         wall_clock: The operator's.
         robot: What the operator calls it; empty leaves that to the robot.
         address: Where the robot is; empty for one that no other process can reach.
-        n_stops: How often the robot was stopped, for any reason.
     """
 
     policy: Policy
@@ -229,7 +228,6 @@ class Guard:
     wall_clock: Callable[[], datetime]
     robot: str = ""
     address: str = ""
-    n_stops: int = 0
     _rates: RateLog = field(default_factory=RateLog)
     _errands: Errands = field(default_factory=Errands)
 
@@ -339,8 +337,11 @@ class Guard:
 
     def end_errands(self) -> None:
         """Let a person be asked again for what is left of errands: the robot was stopped."""
-        self.n_stops += 1
         self._errands.end_all()
+
+    def end_errand(self, errand: Errand) -> None:
+        """Forget what is left of an errand: it is done."""
+        self._errands.end(errand, client=current_caller().client)
 
     def _situation(self, command: Command, robot_s: float) -> Situation:
         n_lately = self._rates.count(command.kind, robot_s)

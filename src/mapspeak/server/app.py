@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import anyio
@@ -35,10 +36,12 @@ from mapspeak.server.text.wording import shorten_report, show_controls, show_con
 from mapspeak.server.tools.asking import Asking
 from mapspeak.server.tools.ros.goals import RosAccess, open_ros_access
 from mapspeak.server.tools.skills.board import SkillBoard
+from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import STOP, build_toolsets, choose_tools
 from mapspeak.session import Session
+from mapspeak.skills.owners.skillsfile import OwnersEntry
 from mapspeak.skills.runs import SkillRuns
 
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
@@ -295,6 +298,7 @@ def build_server(
     representation: Representation = Representation.PICTURE_TABLE,
     call_log: CallNoting | None = None,
     expose: Sequence[str] = (),
+    skills: Sequence[OwnersEntry] = (),
 ) -> MapspeakServer:
     """Build the server with the chosen tools, always in the same order.
 
@@ -305,8 +309,8 @@ def build_server(
         is_read_only: Leaves out every tool that changes something; stopping stays.
         representation: How look_at_map shows the map.
         call_log: Where every call is noted; None for nowhere.
-        expose: Patterns of names of topics, services and actions that are tools too while the
-            robot offers them and `keep_skills` runs.
+        expose: Patterns of names that are tools too while the robot offers them.
+        skills: The owner's; each is a tool, as are the robot's own and saved missions.
 
     Raises:
         ConfigError: There is no such toolset or tool.
@@ -316,22 +320,31 @@ def build_server(
         session.episodes.close()
     elif session.ros is not None:
         session.ros.advertise_early()
-    ros, runs = open_ros_access(session), SkillRuns()
-    known = build_toolsets(session, representation, ros=ros, runs=runs)
-    if expose:
-        toolsets, tools = {*toolsets, "skills"}, {*tools, STOP}
-    chosen = choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
-    moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
+    ros, runs = open_ros_access(session), SkillRuns(partial(_count_stops, session))
+    book = SkillBook(session, ros, skills)
+    known = build_toolsets(session, representation, ros=ros, runs=runs, book=book)
+    sets = {*toolsets} | ({"skills"} if expose or skills else set())
+    tools = {*tools} | ({STOP} if expose or skills else set())
+    chosen = choose_tools(known, toolsets=sets, tools=tools, is_read_only=is_read_only)
     with offering({tool.name for tool in chosen}):
+        moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
         instructions = write_instructions(moves=moves)
         server = MapspeakServer(session, runs, instructions=instructions, call_log=call_log)
         server.skills.is_read_only = is_read_only
         for tool in chosen:
             server.offer(tool)
+    if sets & {"skills", "missions"}:
+        book.put_up(server.skills)
     if expose:
         server.expose(ros, tuple(expose))
     add_prompts(server)
     return server
+
+
+def _count_stops(session: Session) -> int:
+    """Return a number that changes when somebody stops the robot, or holds it."""
+    is_held = session.guard is not None and session.guard.hold.read() is not None
+    return 2 * session.drives.n_stops + is_held
 
 
 def _disagreed() -> ToolError:

@@ -18,6 +18,8 @@ from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
 from mapspeak.server.tools.routes import RouteTools
+from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.missions import MissionTools
 from mapspeak.server.tools.skills.running import SkillRunTools
 from mapspeak.server.tools.toolset import Tool, ToolEffect, tools_of
 from mapspeak.session import Session
@@ -31,6 +33,7 @@ def build_toolsets(
     representation: Representation = Representation.PICTURE_TABLE,
     ros: RosAccess | None = None,
     runs: SkillRuns | None = None,
+    book: SkillBook | None = None,
 ) -> dict[str, list[Tool]]:
     """Return every toolset by its name, in the order in which tools are listed.
 
@@ -39,8 +42,11 @@ def build_toolsets(
         representation: How look_at_map shows the map.
         ros: Its way to a ROS system, where there is one.
         runs: The runs of its skills.
+        book: Its skills.
     """
-    find = FindTools(session)
+    find, ros, runs = FindTools(session), ros or open_ros_access(session), runs or SkillRuns()
+    book = book or SkillBook(session, ros)
+    run_tools = SkillRunTools(runs, book.questions)
     return {
         "look": tools_of(LookTools(session, representation)),
         "places": tools_of(find, PlaceTools(session)),
@@ -49,8 +55,9 @@ def build_toolsets(
         "routes": tools_of(RouteTools(session)),
         "paper": tools_of(PaperTools(session)),
         "memory": tools_of(find, MemoryTools(session)),
-        "ros": _ros_tools(session, ros or open_ros_access(session)),
-        "skills": tools_of(SkillRunTools(runs or SkillRuns())),
+        "ros": _ros_tools(session, ros),
+        "skills": tools_of(run_tools),
+        "missions": tools_of(MissionTools(book, runs), run_tools),
     }
 
 
@@ -95,7 +102,7 @@ def choose_tools(
         return choose_tools(
             known, toolsets=chosen_sets, tools={*chosen_tools, STOP}, is_read_only=is_read_only
         )
-    # find_place stands in two toolsets.
+    # find_place and skill_status stand in two toolsets.
     return list({tool.name: tool for tool in reversed(chosen)}.values())[::-1]
 
 

@@ -13,6 +13,7 @@ from mapspeak.skill import (
     JsonValue,
     Skill,
     SkillCode,
+    SkillEffect,
     SkillOutcome,
     SkillProgress,
     SkillState,
@@ -22,6 +23,8 @@ MOST_KEPT = 200
 MOST_AT_ONCE = 20
 BEGINS_S = 2.0
 """Wall time in which a run that cannot be begun says so; nobody is told before that it goes on."""
+LOOK_S = 0.05
+"""Wall time between two looks for a stop."""
 
 logger = logging.getLogger(__name__)
 
@@ -41,10 +44,11 @@ class SkillRun:
         error: Why it could not be begun.
     """
 
-    def __init__(self, handle: str, skill: Skill, *, client: str) -> None:
+    def __init__(self, handle: str, skill: Skill, *, client: str, n_stops_before: int = 0) -> None:
         self.handle = handle
         self.skill = skill
         self.client = client
+        self.n_stops_before = n_stops_before
         self.begun_s = anyio.current_time()
         self.ended_s: float | None = None
         self.progress: SkillProgress | None = None
@@ -53,6 +57,7 @@ class SkillRun:
         self.error: MapspeakError | None = None
         self._scope = anyio.CancelScope()
         self._news = anyio.Event()
+        self._why = SkillCode.CANCELLED
 
     @property
     def is_over(self) -> bool:
@@ -67,6 +72,11 @@ class SkillRun:
         return SkillState.RUNNING if self.error is None else SkillState.FAILED
 
     @property
+    def is_asking(self) -> bool:
+        """True while it waits for an answer."""
+        return not self.is_over and self.progress is not None and self.progress.is_asking
+
+    @property
     def passed_s(self) -> float:
         """How long it has taken, or took, in wall time."""
         until_s = anyio.current_time() if self.ended_s is None else self.ended_s
@@ -78,8 +88,7 @@ class SkillRun:
             with self._scope:
                 self.outcome = await self.skill.run(arguments, self._take_progress)
             if self.outcome is None:
-                state, code = SkillState.CANCELLED, SkillCode.CANCELLED
-                self.outcome = SkillOutcome(state=state, code=code)
+                self.outcome = SkillOutcome(state=SkillState.CANCELLED, code=self._why)
         except MapspeakError as error:
             self.error = error
         except Exception:
@@ -91,17 +100,26 @@ class SkillRun:
             self._tell()
 
     async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
-        """Return at its end, or after so long in wall time; tell of news meanwhile."""
+        """Return at its end, when it asks something, or after so long; tell of news meanwhile.
+
+        Args:
+            wait_s: Wall time.
+        """
         with anyio.move_on_after(wait_s):
-            while not self.is_over:
+            while not self.is_over and not self.is_asking:
                 news, n_before = self._news, self.n_progress
                 await news.wait()
                 if on_news is not None and self.n_progress != n_before:
                     await on_news(self)
 
+    def give_up(self, why: SkillCode = SkillCode.CANCELLED) -> None:
+        """Have it end."""
+        self._why = why
+        self._scope.cancel()
+
     async def cancel(self) -> None:
         """End it, and return when it has ended: nothing of it is left at the robot then."""
-        self._scope.cancel()
+        self.give_up()
         while not self.is_over:
             await self._news.wait()
 
@@ -116,9 +134,14 @@ class SkillRun:
 
 
 class SkillRuns:
-    """All runs of one server, the latest last; they go on while `keep_going` runs."""
+    """All runs of one server, the latest last; they go on while `keep_going` runs.
 
-    def __init__(self) -> None:
+    Args:
+        count_stops: Changes when somebody stops the robot: that ends what does not only read.
+    """
+
+    def __init__(self, count_stops: Callable[[], int] = lambda: 0) -> None:
+        self._count_stops = count_stops
         self._runs: OrderedDict[str, SkillRun] = OrderedDict()
         self._n_begun = 0
         self._tasks: TaskGroup | None = None
@@ -132,11 +155,20 @@ class SkillRuns:
         """Let runs go on in the background while some work is done; they end with it."""
         async with anyio.create_task_group() as tasks:
             self._tasks = tasks
+            tasks.start_soon(self._obey_stops)
             try:
                 await work()
             finally:
                 self._tasks = None
                 tasks.cancel_scope.cancel()
+
+    async def _obey_stops(self) -> None:
+        while True:
+            await anyio.sleep(LOOK_S)
+            for run in self.under_way:
+                does = run.skill.spec.effect is not SkillEffect.READS
+                if does and run.n_stops_before != self._count_stops():
+                    run.give_up(SkillCode.STOPPED)
 
     async def begin(
         self,
@@ -161,7 +193,9 @@ class SkillRuns:
                 f"{MOST_AT_ONCE} skills are being run at once.", hint="Wait for one, or cancel it."
             )
         self._n_begun += 1
-        run = SkillRun(f"S{self._n_begun}", skill, client=client)
+        run = SkillRun(
+            f"S{self._n_begun}", skill, client=client, n_stops_before=self._count_stops()
+        )
         self._runs[run.handle] = run
         self._forget_old()
         self._tasks.start_soon(partial(run.do, dict(arguments)))

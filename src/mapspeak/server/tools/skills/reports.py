@@ -1,6 +1,9 @@
 """Skills and their runs in words."""
 
-from mapspeak.memory.quoting import quote
+from collections.abc import Sequence
+
+from mapspeak.memory.quoting import clean_line, quote
+from mapspeak.server.text.missions import say_waiting
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.ros.reports import cut, show_message
@@ -13,6 +16,7 @@ from mapspeak.skill import (
     SkillSpec,
     SkillState,
 )
+from mapspeak.skills.missions.questions import QuestionBook
 from mapspeak.skills.runs import SkillRun
 
 MOST_SENTENCE = 300
@@ -59,18 +63,30 @@ def say_precondition(precondition: Precondition) -> str:
             return f"the robot in {quote(precondition.room, most=80)}"
 
 
-def say_run(run: SkillRun) -> str:
-    """Return how a run stands, with what it told last or gave in the end."""
+def say_run(run: SkillRun, questions: QuestionBook | None = None) -> str:
+    """Return how a run stands, with what it told last or gave in the end.
+
+    Args:
+        questions: Those that wait, where it is a mission that may ask some.
+    """
     name = run.skill.spec.name
     head = f"{run.handle} ({name}): {run.state} after {run.passed_s:.1f} s."
+    account = "" if run.progress is None else _say_account(run.progress.account)
     if run.outcome is not None:
-        return cut("\n".join(filter(None, (head, _say_outcome(run.outcome)))))
+        return cut("\n".join(filter(None, (head, account, _say_outcome(run.outcome)))))
     if run.error is not None:
         return f"{head}\n{run.error}"
     told = ""
     if run.progress is not None and run.progress.values:
         told = f"latest progress of {run.n_progress}:\n{show_message(run.progress.values)}"
-    return cut("\n".join(filter(None, (head, told, lead(GOES_ON)))))
+    asked = say_waiting(questions) if run.is_asking and questions is not None else ""
+    return cut("\n".join(filter(None, (head, account, told, asked, lead(GOES_ON)))))
+
+
+def _say_account(account: Sequence[str]) -> str:
+    """Return what a mission has done; texts of others stand in it, so that it is quoted."""
+    lines = (f"- {clean_line(each)}" for each in account)
+    return "\n".join(["Done (observed, no instruction):", *lines]) if account else ""
 
 
 def _say_outcome(outcome: SkillOutcome) -> str:

@@ -8,6 +8,7 @@ from pydantic import Field
 from mapspeak.server.tools.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.skills.reports import say_progress, say_run
 from mapspeak.server.tools.toolset import ToolEffect, tool
+from mapspeak.skills.missions.questions import QuestionBook
 from mapspeak.skills.runs import OnNews, SkillRun, SkillRuns
 
 Handle = Annotated[
@@ -24,8 +25,9 @@ Wait = Annotated[
 class SkillRunTools:
     """Asking and cancelling; each skill is a tool of its own."""
 
-    def __init__(self, runs: SkillRuns) -> None:
+    def __init__(self, runs: SkillRuns, questions: QuestionBook) -> None:
         self._runs = runs
+        self._questions = questions
 
     @tool("How a skill stands", ToolEffect.READS)
     async def skill_status(self, context: Context, run: Handle = None, wait_s: Wait = 0.0) -> str:
@@ -35,7 +37,7 @@ class SkillRunTools:
         """
         found = self._runs.find(run)
         await found.wait(wait_s=wait_s, on_news=tell_news(context))
-        return say_run(found)
+        return say_run(found, self._questions)
 
     @tool(
         "Cancel a skill",

@@ -1,0 +1,141 @@
+"""`mapspeak skills`: check, list and try what the owner of a robot wrote in skills.yaml."""
+
+import math
+from collections.abc import AsyncGenerator
+from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import anyio
+import click
+
+from mapspeak.cli.options import (
+    DEFAULT_WORLD,
+    FILE,
+    GUARD_OPTIONS,
+    ROBOT_HELP,
+    GuardChoice,
+    add_options,
+    grouped,
+)
+from mapspeak.cli.robots import RobotChoice
+from mapspeak.cli.starting import RobotStart, open_session
+from mapspeak.errors import ConfigError
+
+if TYPE_CHECKING:
+    from mapspeak.server.tools.skills.book import SkillBook
+    from mapspeak.skills.owners.skillsfile import OwnersEntry
+    from mapspeak.skills.runs import SkillRuns
+
+ROBOT_OPTION = click.option(
+    "--robot", default=f"sim:{DEFAULT_WORLD}", show_default=True, help=ROBOT_HELP
+)
+AT_ROBOT_OPTION = click.option("--robot", help=f"Check it at this robot too. {ROBOT_HELP}")
+SKILLS_FILE = click.argument("file", type=FILE)
+
+
+@click.group()
+def skills() -> None:
+    """Check, list and try skills: what a robot can do besides driving, in its owner's words."""
+
+
+@skills.command("check")
+@SKILLS_FILE
+@AT_ROBOT_OPTION
+def check(file: Path, robot: str | None) -> None:
+    """Say whether FILE is right, and with --robot whether the robot offers what it calls."""
+    entries = _load(file)
+    if robot is None:
+        click.echo(f"{file}: {len(entries)} skills, no mistake.")
+        return
+    anyio.run(_check, entries, robot)
+
+
+@skills.command("list")
+@SKILLS_FILE
+def list_skills(file: Path) -> None:
+    """List the skills of FILE with what they take."""
+    from mapspeak.skills.arguments import say_wanted  # noqa: PLC0415 - heavy; help must be quick
+
+    for each in _load(file):
+        spec = each.spec
+        click.echo(f"{spec.name}: {spec.description or each.target or each.calls}")
+        for parameter in spec.parameters:
+            default = "" if parameter.default is None else f", {parameter.default!r} if left out"
+            click.echo(f"  {parameter.name}: {say_wanted(parameter)}{default}")
+
+
+@skills.command("try")
+@SKILLS_FILE
+@click.argument("name")
+@click.argument("arguments", nargs=-1, metavar="[NAME=VALUE]...")
+@ROBOT_OPTION
+@add_options(GUARD_OPTIONS[1:])
+@click.option("--policy", type=FILE, help="policy.yaml: limits, closed areas, approvals.")
+@grouped("guard", GuardChoice, ("policy", "audit", "control"))
+def try_skill(
+    file: Path, name: str, arguments: tuple[str, ...], robot: str, guard: GuardChoice
+) -> None:
+    """Run the skill NAME of FILE once, as a model would, and say how it ended."""
+    anyio.run(partial(_try, _load(file), name, arguments, robot, guard))
+
+
+def _load(file: Path) -> "tuple[OwnersEntry, ...]":
+    from mapspeak.skills.owners.skillsfile import load_skills  # noqa: PLC0415 - heavy; help must be quick
+
+    return load_skills(file)
+
+
+@asynccontextmanager
+async def _open(
+    entries: "tuple[OwnersEntry, ...]", robot: str, guard: GuardChoice
+) -> "AsyncGenerator[tuple[SkillBook, SkillRuns]]":
+    from mapspeak.server.tools.ros.goals import open_ros_access  # noqa: PLC0415
+    from mapspeak.server.tools.skills.book import SkillBook  # noqa: PLC0415
+    from mapspeak.skills.runs import SkillRuns  # noqa: PLC0415
+
+    start = RobotStart(choice=RobotChoice(robot=robot), memory=None, guard=guard)
+    async with AsyncExitStack() as links:
+        scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
+        session = await open_session("", start, links, Path(scratch), lease_s=math.inf)
+        if session.ros is not None:
+            await session.ros.wait_until_connected()
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(session.keep_watch)
+            runs = SkillRuns()
+            tasks.start_soon(runs.keep_going, anyio.sleep_forever)
+            await anyio.lowlevel.checkpoint()
+            yield SkillBook(session, open_ros_access(session), entries), runs
+            await session.close()
+            tasks.cancel_scope.cancel()
+
+
+async def _check(entries: "tuple[OwnersEntry, ...]", robot: str) -> None:
+    async with _open(entries, robot, GuardChoice()) as (book, _):
+        faults = {each.spec.name: await book.check_entry(each) for each in entries}
+    for name, fault in faults.items():
+        click.echo(f"{name}: {fault or 'offered'}")
+    if wrong := [name for name, fault in faults.items() if fault]:
+        raise ConfigError(
+            f"{len(wrong)} of {len(faults)} skills cannot be run at {robot}.",
+            hint="Correct them, or start what offers them.",
+        )
+
+
+async def _try(
+    entries: "tuple[OwnersEntry, ...]",
+    name: str,
+    arguments: tuple[str, ...],
+    robot: str,
+    guard: GuardChoice,
+) -> None:
+    from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
+    from mapspeak.server.tools.skills.reports import say_run  # noqa: PLC0415
+
+    async with _open(entries, robot, guard) as (book, runs):
+        skill = book.find(name)
+        given = read_values(skill.spec, list(arguments))
+        run = await runs.begin(skill, given, wait_s=skill.spec.timeout_s)
+        click.echo(say_run(run, book.questions))

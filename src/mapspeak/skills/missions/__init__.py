@@ -1,0 +1,1 @@
+"""Missions: trees of skills that the server runs by itself."""

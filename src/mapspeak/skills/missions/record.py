@@ -1,0 +1,130 @@
+"""What missions did, on disk: one JSON line a step, so that a killed server leaves an account."""
+
+import json
+import logging
+import os
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+logger = logging.getLogger(__name__)
+
+MOST_BYTES = 5_000_000
+"""A file that has grown larger is renamed to "NAME.1", in place of the one before."""
+MOST_TOLD = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interrupted:
+    """A mission that a server began and did not live to end.
+
+    Attributes:
+        begun: ISO 8601, by the operator's clock.
+        steps: What it had done.
+    """
+
+    name: str
+    begun: str
+    steps: tuple[str, ...]
+
+
+class MissionRecord:
+    """Writes one file, and finds in it what an earlier server has left off.
+
+    Args:
+        path: The file.
+        wall_clock: The operator's; without one no times are written.
+    """
+
+    def __init__(self, path: Path, *, wall_clock: Callable[[], datetime | None]) -> None:
+        self._path = path
+        self._wall_clock = wall_clock
+        self._run = ""
+
+    def begin(self, name: str) -> None:
+        """Note that a mission begins; what follows is of that one."""
+        self._run = secrets.token_hex(4)
+        self._write("begun", name)
+
+    def note(self, said: str) -> None:
+        """Note a step."""
+        self._write("step", said)
+
+    def end(self, said: str) -> None:
+        """Note how the mission has ended."""
+        self._write("ended", said)
+
+    def take_interrupted(self) -> tuple[Interrupted, ...]:
+        """Return the missions that no server will end any more, once: they are noted as ended."""
+        names: dict[str, tuple[str, str]] = {}
+        steps: dict[str, list[str]] = {}
+        for line in self._read():
+            run, event = str(line.get("run")), line.get("event")
+            if event == "begun" and not _is_alive(line.get("process")):
+                names[run] = (str(line.get("said")), str(line.get("at")))
+            elif event == "step":
+                steps.setdefault(run, []).append(str(line.get("said")))
+            elif event == "ended":
+                names.pop(run, None)
+        if names:
+            # The last line of a server that was killed may be half a line.
+            with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
+                file.write("\n")
+        for run in names:
+            self._run = run
+            self._write("ended", "interrupted: its server ended")
+        found = [
+            Interrupted(name=name, begun=begun, steps=tuple(steps.get(run, ())))
+            for run, (name, begun) in names.items()
+        ]
+        return tuple(found[-MOST_TOLD:])
+
+    def _read(self) -> Iterator[dict[str, Any]]:
+        try:
+            lines = self._path.read_text(encoding="utf-8").splitlines()
+        except OSError:
+            return
+        for line in lines:
+            try:
+                read = json.loads(line)
+            except ValueError:
+                # The last line of a server that was killed.
+                continue
+            if isinstance(read, dict):
+                yield read
+
+    def _write(self, event: str, said: str) -> None:
+        """Append a line; that it cannot be is told, and ends no mission."""
+        at = self._wall_clock()
+        line = {
+            "at": None if at is None else at.isoformat(timespec="seconds"),
+            "run": self._run,
+            "process": os.getpid(),
+            "event": event,
+            "said": said,
+        }
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            if self._path.exists() and self._path.stat().st_size > MOST_BYTES:
+                self._path.replace(self._path.with_name(f"{self._path.name}.1"))
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(line) + "\n")
+        except OSError as error:
+            logger.warning("What missions do could not be noted: %s", error.strerror)
+
+
+def _is_alive(process: object) -> bool:
+    """Return True for another server that goes on; this one has begun nothing before it looks."""
+    if not isinstance(process, int) or process == os.getpid():
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
