@@ -13,7 +13,7 @@ def told() -> list[str]:
 @pytest.fixture
 def announcements(told: list[str]) -> Announcements:
     return Announcements(
-        lambda topic, type_name: told.append(f"{topic} {type_name}"),
+        lambda topic, type_name, _is_latched: told.append(f"{topic} {type_name}"),
         lambda topic: told.append(f"{topic} gone"),
     )
 

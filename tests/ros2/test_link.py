@@ -308,6 +308,17 @@ async def test_what_is_published_arrives_as_it_was(domain: dict[str, str]) -> No
     assert np.array_equal(heard.latest["data"], cells)
 
 
+async def test_what_is_latched_reaches_who_subscribes_later(domain: dict[str, str]) -> None:
+    assert domain
+    async with connected() as one:
+        one.advertise("/note", type_name="std_msgs/msg/String", is_latched=True)
+        await one.publish("/note", {"data": "R1"})
+        async with connected() as other:
+            notes = other.subscribe("/note")
+            message = await notes.wait_for_more_than(0, timeout_s=PATIENCE_S)
+    assert message["data"] == "R1"
+
+
 @pytest.mark.parametrize("cells", [[1.5], [True], [300], ["1"], np.array([0.5]), [None]])
 async def test_cells_that_are_none_are_refused(domain: dict[str, str], cells: object) -> None:
     assert domain

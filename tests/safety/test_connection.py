@@ -47,7 +47,8 @@ class FakeRos:
         self.action_types: dict[str, str] = {}
         self.advertised: list[str] = []
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
+    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
+        assert not is_latched
         assert type_name
         self.advertised.append(topic)
 

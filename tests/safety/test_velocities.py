@@ -67,7 +67,8 @@ class Wheels:
         self.robot = robot
         self.heard: list[Any] = []
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
+    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
+        assert not is_latched
         assert topic
         assert type_name
 

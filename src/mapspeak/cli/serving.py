@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
+from mapspeak.cli.drawing import DRAWING_OPTIONS, DrawingChoice, open_drawing
 from mapspeak.cli.options import (
     DEFAULT_WORLD,
     FILE,
@@ -63,6 +64,7 @@ class ServeOptions:
     representation: "Representation | None"
     call_log: Path | None
     view: str | None
+    drawing: DrawingChoice
     skills: SkillChoice
 
 
@@ -170,10 +172,12 @@ class ToolChoice:
     "--call-log", type=FILE, help="Log every call and answer here, as JSON lines, with pictures."
 )
 @VIEW_OPTION
+@add_options(DRAWING_OPTIONS)
 @add_options(GUARD_OPTIONS)
 @grouped("choice", partial(RobotChoice, robot=""), SIMULATION)
 @grouped("guard", GuardChoice, ("audit", "control"))
 @grouped("skills", SkillChoice, ("expose", "skill_files"))
+@grouped("drawing", DrawingChoice, ("has_markers", "record", "foxglove"))
 def serve(
     robots: tuple[str, ...],
     robot_files: tuple[str, ...],
@@ -188,6 +192,7 @@ def serve(
     representation: "Representation | None",
     call_log: Path | None,
     view: str | None,
+    drawing: DrawingChoice,
     policies: tuple[str, ...],
     guard: GuardChoice,
 ) -> None:
@@ -201,6 +206,7 @@ def serve(
         representation=representation,
         call_log=call_log,
         view=view,
+        drawing=drawing,
         skills=skills,
     )
     anyio.run(_serve, options)
@@ -215,15 +221,17 @@ async def _serve(options: ServeOptions) -> None:
     lease_s = math.inf if options.http is None else options.lease_s
     async with AsyncExitStack() as links:
         scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
-        sessions = {
+        opened = {
             name: await open_session(name, start, links, Path(scratch), lease_s=lease_s)
             for name, start in options.robots.items()
         }
+        sessions = {name: session for name, (session, _) in opened.items()}
         call_log = None if options.call_log is None else CallLog(options.call_log)
         page = make_page(sessions, call_log, options.view, tells_token=options.http is not None)
+        noted = {name: feed.calls for name, feed in page.feeds.items()}
+        drawers, notes = open_drawing(opened, options.drawing, noted, links)
         servers = {
-            name: _build_server(session, options, page.feeds[name].calls)
-            for name, session in sessions.items()
+            name: _build_server(session, options, notes[name]) for name, session in sessions.items()
         }
         server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
         # What was loaded stays for good: no later collection has to go through it, which would
@@ -235,6 +243,8 @@ async def _serve(options: ServeOptions) -> None:
             for session, each in zip(sessions.values(), servers.values(), strict=True):
                 tasks.start_soon(session.keep_watch)
                 tasks.start_soon(each.keep_skills)
+            for draw in drawers:
+                tasks.start_soon(draw)
             try:
                 await tasks.start(page.serve)
                 what = ", ".join(start.choice.shown for start in options.robots.values())

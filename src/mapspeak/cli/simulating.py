@@ -1,16 +1,19 @@
 """`mapspeak simulate` and `mapspeak demo`: the simulated robot for other programs, and at work."""
 
+import math
 import shutil
 import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import anyio
 import click
 
+from mapspeak.cli.drawing import MARKERS_OPTION
 from mapspeak.cli.evaluating import INTERRUPTED
 from mapspeak.cli.operating import StopKeys, Tell, stop_keys
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION, usual_modes
@@ -19,6 +22,7 @@ from mapspeak.errors import ConfigError
 if TYPE_CHECKING:
     from mapspeak.evaluation.runs.showing import TrialBar
     from mapspeak.evaluation.trials import TrialResult, Turn
+    from mapspeak.robot import Robot
     from mapspeak.safety import Hold
 
 
@@ -45,7 +49,15 @@ DEFAULT_ROSBRIDGE = "127.0.0.1:9090"
     is_flag=True,
     help="As the parameter of that name in rosbridge: a goal does not block its client's socket.",
 )
-def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread: bool) -> None:  # noqa: FBT001 - a flag
+@MARKERS_OPTION
+def simulate(
+    address: str,
+    ros: str,
+    world: str,
+    seed: int,
+    goals_in_new_thread: bool,  # noqa: FBT001 - a flag
+    has_markers: bool,  # noqa: FBT001 - a flag
+) -> None:
     """Offer the simulated robot to any rosbridge client, as a robot with ROS 1 or ROS 2."""
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.ros.messages.fields import Dialect  # noqa: PLC0415
@@ -66,14 +78,30 @@ def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread:
                 goals_in_new_thread=goals_in_new_thread,
                 skilled=robot,
             ) as server,
+            anyio.create_task_group() as tasks,
         ):
+            if has_markers:
+                tasks.start_soon(_publish_markers, robot, server.url)
             offered = f"{robot.description.name} in {robot.description.map_name}, ROS{ros}"
             with anyio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
                 click.echo(f"mapspeak: {offered}: {server.url}", err=True)
                 async for _ in signals:
-                    return
+                    tasks.cancel_scope.cancel()
 
     anyio.run(run)
+
+
+async def _publish_markers(robot: "Robot", url: str) -> None:
+    """Be a client of the simulated robot's own rosbridge that remembers nothing."""
+    from mapspeak.links.rosbridge import RobotAddress, open_client  # noqa: PLC0415
+    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415
+    from mapspeak.server.view.marking import MarkerPublisher  # noqa: PLC0415
+    from mapspeak.session import Session  # noqa: PLC0415
+
+    with TemporaryDirectory(prefix="mapspeak-") as scratch:
+        session = Session(robot, SemanticMapStore(Path(scratch) / MEMORY), lease_s=math.inf)
+        async with open_client(RobotAddress(url=url)) as connection:
+            await MarkerPublisher(session, connection).run()
 
 
 def _parse_address(address: str) -> tuple[str, int]:

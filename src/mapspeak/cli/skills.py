@@ -99,7 +99,7 @@ async def _open(
     start = RobotStart(choice=RobotChoice(robot=robot), memory=None, guard=guard)
     async with AsyncExitStack() as links:
         scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
-        session = await open_session("", start, links, Path(scratch), lease_s=math.inf)
+        session, _ = await open_session("", start, links, Path(scratch), lease_s=math.inf)
         if session.ros is not None:
             await session.ros.wait_until_connected()
         async with anyio.create_task_group() as tasks:

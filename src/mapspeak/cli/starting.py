@@ -18,6 +18,7 @@ from mapspeak.cli.robots import (
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
+    from mapspeak.ros.port import RosConnection
     from mapspeak.session import Session
 
 
@@ -85,8 +86,8 @@ def _is_for_one(choice: RobotChoice) -> bool:
 
 async def open_session(
     name: str, start: RobotStart, links: AsyncExitStack, scratch: Path, *, lease_s: float
-) -> "Session":
-    """Return a session over one robot, which lasts as long as its links.
+) -> "tuple[Session, RosConnection | None]":
+    """Return a session over one robot, and the robot's ROS as it is; both last as its links do.
 
     Args:
         name: What the operator calls the robot; empty for an only one.
@@ -105,7 +106,7 @@ async def open_session(
         folder = scratch / name if served.ros is None else data_folder()
         file = keep_usual_memory(folder, served.map_name, choice.shown, address=choice.robot)
     memory = open_store(file, map_id=served.map_name or None)
-    return Session(
+    session = Session(
         served.robot,
         memory,
         lease_s=lease_s,
@@ -113,3 +114,4 @@ async def open_session(
         ros=served.ros,
         skilled=served.skilled,
     )
+    return session, served.ros

@@ -217,13 +217,13 @@ class NativeLink(RosLink[NativeRequest]):
 
     # --- writing
 
-    def _announce(self, topic: str, type_name: str) -> None:
+    def _announce(self, topic: str, type_name: str, is_latched: bool) -> None:  # noqa: FBT001
         full = full_type(type_name)
         known, _ = self._advertised.get(topic, (full, None))
         if known != full:
             raise wrong_type(topic, known, type_name)
         if topic not in self._advertised:
-            is_latched = any(each.is_latched for each in self._readers_of(topic))
+            is_latched = is_latched or any(each.is_latched for each in self._readers_of(topic))
             quality = self._quality(is_reliable=True, is_latched=is_latched, depth=DEPTH)
             self._advertised[topic] = full, self._write_to(topic, full, quality)
 

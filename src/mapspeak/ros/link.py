@@ -29,10 +29,12 @@ class Announcements:
     more, so that a robot that is not to hear of it must not be told in the first place.
     """
 
-    def __init__(self, tell: Callable[[str, str], None], take_back: Callable[[str], None]) -> None:
+    def __init__(
+        self, tell: Callable[[str, str, bool], None], take_back: Callable[[str], None]
+    ) -> None:
         self._tell = tell
         self._take_back = take_back
-        self._types: dict[str, str] = {}
+        self._noted: dict[str, tuple[str, bool]] = {}
         self._told: set[str] = set()
         self._is_early = True
 
@@ -43,19 +45,19 @@ class Announcements:
 
     def type_of(self, topic: str) -> str | None:
         """Return the type that a topic was advertised with; None for one that was not."""
-        return self._types.get(topic)
+        return self._noted[topic][0] if topic in self._noted else None
 
-    def advertise(self, topic: str, type_name: str) -> None:
+    def advertise(self, topic: str, type_name: str, *, is_latched: bool = False) -> None:
         """Note a topic, and tell the robot of it where that is to be early."""
         if self._is_early or topic in self._told:
             # Told again, also where it is known: the robot may have been started anew.
-            self._tell(topic, type_name)
+            self._tell(topic, type_name, is_latched)
             self._told.add(topic)
-        self._types[topic] = type_name
+        self._noted[topic] = type_name, is_latched
 
     def unadvertise(self, topic: str) -> None:
         """Forget a topic."""
-        if self._types.pop(topic, None) is not None and topic in self._told:
+        if self._noted.pop(topic, None) is not None and topic in self._told:
             self._told.discard(topic)
             self._take_back(topic)
 
@@ -66,15 +68,14 @@ class Announcements:
     def be_early(self) -> None:
         """Tell the robot of all topics that were noted, and at once of those that follow."""
         self._is_early = True
-        for topic in self._types:
+        for topic in self._noted:
             self.use(topic)
 
     def use(self, topic: str) -> bool:
         """Tell the robot of a topic before a message; True when it hears of it only now."""
-        type_name = self._types.get(topic)
-        if type_name is None or topic in self._told:
+        if topic not in self._noted or topic in self._told:
             return False
-        self._tell(topic, type_name)
+        self._tell(topic, *self._noted[topic])
         self._told.add(topic)
         return True
 
@@ -147,10 +148,10 @@ class RosLink(ParameterServices, Generic[Request]):
             request.n_renewals += 1
             self._begin(request)
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
+    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
         """Say that we will publish."""
         self._check(topic, type_name)
-        self.announcements.advertise(topic, type_name)
+        self.announcements.advertise(topic, type_name, is_latched=is_latched)
 
     def unadvertise(self, topic: str) -> None:
         """Take back what `advertise` said."""
@@ -188,7 +189,7 @@ class RosLink(ParameterServices, Generic[Request]):
         """Read a topic no longer."""
 
     @abstractmethod
-    def _announce(self, topic: str, type_name: str) -> None:
+    def _announce(self, topic: str, type_name: str, is_latched: bool) -> None:  # noqa: FBT001
         """Tell the robot that we will publish."""
 
     @abstractmethod

@@ -153,8 +153,11 @@ class RosConnection(Protocol):
     def renew(self, subscription: Subscription) -> None:
         """Subscribe again, perhaps in another way: a latched message may have been missed."""
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
-        """Say that we will publish; the robot needs a moment until it listens."""
+    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
+        """Say that we will publish; the robot needs a moment until it listens.
+
+        Who subscribes late to a latched topic ("transient local") gets what was published last.
+        """
 
     def unadvertise(self, topic: str) -> None:
         """Take back what `advertise` said; do nothing for what was not advertised."""

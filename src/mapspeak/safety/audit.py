@@ -115,6 +115,8 @@ class AuditLog:
         self._wall_clock = wall_clock
         self._run = f"{wall_clock():%Y%m%dT%H%M%S}-{os.getpid()}-{secrets.token_hex(2)}"
         self._numbers = itertools.count(1)
+        self.tell: Callable[[Mapping[str, Any]], None] = lambda _: None
+        """Is called with each line that is written; it must not raise."""
 
     def next_number(self) -> int:
         """Return the number of another command."""
@@ -153,6 +155,7 @@ class AuditLog:
         }
         text = json.dumps(line, ensure_ascii=False, default=lambda value: str(value)[:200])
         self._append(f"{text}\n".encode(errors="replace"))
+        self.tell(line)
 
     def _append(self, line: bytes) -> None:
         """Write a whole line or raise: opened anew, so that a file that was moved is noticed."""

@@ -302,7 +302,7 @@ class GuardedConnection:
         """Subscribe again, perhaps in another way: a latched message may have been missed."""
         self._connection.renew(subscription)
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
+    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
         """Say that we will publish; the robot needs a moment until it listens.
 
         Raises:
@@ -311,7 +311,7 @@ class GuardedConnection:
         command = Publish(topic=topic, type=type_name, message={})
         self.check_name(read_action_goal(command) or command)
         self._types[topic] = type_name
-        self._connection.advertise(topic, type_name=type_name)
+        self._connection.advertise(topic, type_name=type_name, is_latched=is_latched)
 
     def unadvertise(self, topic: str) -> None:
         """Take back what `advertise` said; do nothing for what was not advertised."""

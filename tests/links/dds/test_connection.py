@@ -24,7 +24,9 @@ from dds_node import (
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsNetwork, open_dds_connection
 from mapspeak.links.dds.types import Types
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid
+from mapspeak.ros.messages.markers import Marker, MarkShape, write_markers
 
 pytestmark = pytest.mark.anyio
 
@@ -324,3 +326,19 @@ async def test_a_domain_can_be_left_and_entered_again() -> None:
             node.introduce()
             async with open_here(network) as connection:
                 assert connection.is_open
+
+
+async def test_markers_reach_who_subscribes_later() -> None:
+    topic, kind = "/mapspeak/markers", "visualization_msgs/msg/MarkerArray"
+    mark = Marker(
+        group="rooms", shape=MarkShape.TEXT, size_m=0.2, colour=(1.0, 0.0, 0.0, 1.0), text="R1"
+    )
+    async with open_both() as (node, connection):
+        connection.advertise(topic, type_name=kind, is_latched=True)
+        message = write_markers([mark], frame_id="map", dialect=Dialect.ROS2)
+        await connection.publish(topic, message)
+        node.listen(topic, kind, quality=LATCHED)
+        await until(lambda: node.heard[topic])
+    erase, text = node.heard[topic][0]["markers"]
+    assert erase["action"] == 3
+    assert (text["ns"], text["text"], text["header"]["frame_id"]) == ("rooms", "R1", "map")

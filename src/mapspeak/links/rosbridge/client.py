@@ -124,7 +124,7 @@ class RosbridgeClient(Rosapi):
             tasks.start_soon(self._control.say_goodbye)
             tasks.start_soon(self._urgent.say_goodbye)
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
+    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
         """Say that we will publish; the robot needs a moment until it listens."""
         known = self.announcements.type_of(topic) or type_name
         if known != type_name:
@@ -132,7 +132,7 @@ class RosbridgeClient(Rosapi):
                 f"{topic} was advertised as {known}, not as {type_name}.",
                 hint="A topic has one type: look it up on the robot.",
             )
-        super().advertise(topic, type_name=type_name)
+        super().advertise(topic, type_name=type_name, is_latched=is_latched)
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish on an advertised topic."""
@@ -234,8 +234,14 @@ class RosbridgeClient(Rosapi):
         if self._carries_goal(self._free_for_calls()) or self._free_for_calls().is_waiting:
             self._free_for_calls().replace()
 
-    def _announce(self, topic: str, type_name: str) -> None:
-        text = write_operation("advertise", id=f"advertise:{topic}", topic=topic, type=type_name)
+    def _announce(self, topic: str, type_name: str, is_latched: bool) -> None:  # noqa: FBT001
+        text = write_operation(
+            "advertise",
+            id=f"advertise:{topic}",
+            topic=topic,
+            type=type_name,
+            latch=is_latched or None,
+        )
         for channel in (self._control, self._urgent):
             channel.keep_standing(f"advertise:{topic}", text)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from mcp_types import ImageContent, TextContent
 
-from mapspeak.server.calllog import CallLog, CallNote
+from mapspeak.server.calllog import CallNote, CallNoting
 from mapspeak.server.view.document import CallView
 
 MOST_CALLS = 100
@@ -29,7 +29,7 @@ class CallFeed:
         log: Where every call is written as well.
     """
 
-    def __init__(self, log: CallLog | None = None) -> None:
+    def __init__(self, log: CallNoting | None = None) -> None:
         self._log = log
         self._numbers = itertools.count(1)
         self._calls: dict[int, CallView] = {}

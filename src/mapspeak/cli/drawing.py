@@ -1,0 +1,114 @@
+"""What is drawn of served robots beside their tools and the live page: RViz, Foxglove, a file."""
+
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mapspeak.cli.options import FILE
+from mapspeak.errors import ConfigError
+from mapspeak.installation import say_install, shell_command
+
+if TYPE_CHECKING:
+    from mapspeak.ros.port import RosConnection
+    from mapspeak.server.calllog import CallNoting
+    from mapspeak.server.view.recording import Recorder
+    from mapspeak.session import Session
+
+DEFAULT_FOXGLOVE = "127.0.0.1:8765"
+MARKERS_OPTION = click.option(
+    "--markers",
+    "has_markers",
+    is_flag=True,
+    help="Publish rooms, doors, frontiers, places, things, closed areas and the path on the "
+    "robot's ROS, for RViz: /mapspeak/markers (visualization_msgs/MarkerArray, latched).",
+)
+DRAWING_OPTIONS = (
+    MARKERS_OPTION,
+    click.option(
+        "--record",
+        type=FILE,
+        help="Record map, pose, camera, markers, calls and audit as MCAP (the extra foxglove).",
+    ),
+    click.option(
+        "--foxglove",
+        is_flag=False,
+        flag_value=DEFAULT_FOXGLOVE,
+        metavar="[HOST:PORT]",
+        help=f"Show the same live in Foxglove on this machine; at {DEFAULT_FOXGLOVE} by default.",
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawingChoice:
+    """Where else what lies on the map is drawn."""
+
+    has_markers: bool = False
+    record: Path | None = None
+    foxglove: str | None = None
+
+
+def open_drawing(
+    opened: "Mapping[str, tuple[Session, RosConnection | None]]",
+    choice: DrawingChoice,
+    notes: "Mapping[str, CallNoting | None]",
+    links: AsyncExitStack,
+) -> "tuple[list[Callable[[], Coroutine[Any, Any, None]]], dict[str, CallNoting | None]]":
+    """Return what draws the robots in the background, and where the calls of each are noted.
+
+    Raises:
+        ConfigError: A robot has no ROS, or what is chosen cannot be opened.
+    """
+    drawers: list[Callable[[], Coroutine[Any, Any, None]]] = []
+    if choice.has_markers:
+        from mapspeak.server.view.marking import MarkerPublisher  # noqa: PLC0415 - heavy
+
+        for name, (session, ros) in opened.items():
+            if ros is None:
+                raise ConfigError(
+                    "--markers needs a robot with ROS: there is nothing to publish on.",
+                    hint=f"`{shell_command('simulate --rosbridge --markers')}` is one; --foxglove "
+                    "and --record show the simulated robot without ROS.",
+                )
+            drawers.append(MarkerPublisher(session, ros, name=name).run)
+    recorders = _open_recorders(choice, links)
+    if not recorders:
+        return drawers, dict(notes)
+    from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - heavy
+    from mapspeak.server.view.recording import SessionRecord  # noqa: PLC0415 - optional
+
+    calls = {name: CallFeed(notes[name]) for name in opened}
+    for name, (session, _) in opened.items():
+        drawers.append(SessionRecord(session, recorders, calls[name], name=name).run)
+    return drawers, {**calls}
+
+
+def _open_recorders(choice: DrawingChoice, links: AsyncExitStack) -> "list[Recorder]":
+    if choice.record is None and choice.foxglove is None:
+        return []
+    if find_spec("foxglove") is None:
+        raise ConfigError(
+            "--record and --foxglove need a package that is not installed.",
+            hint=f"Install it: {say_install('foxglove')}",
+        )
+    from mapspeak.server.transport import is_loopback, parse_address  # noqa: PLC0415 - heavy
+    from mapspeak.server.view.recording import record_to, serve_foxglove  # noqa: PLC0415 - optional
+
+    recorders = []
+    if choice.record is not None:
+        recorders.append(links.enter_context(record_to(choice.record)))
+    if choice.foxglove is not None:
+        host, port = parse_address(choice.foxglove)
+        if not is_loopback(host):
+            raise ConfigError(
+                f"{host} can be reached from other machines, and Foxglove asks for no password.",
+                hint="Serve it on 127.0.0.1, and reach it through an SSH tunnel.",
+            )
+        recorders.append(links.enter_context(serve_foxglove(host, port)))
+        click.echo(f"mapspeak: for Foxglove at ws://{choice.foxglove}", err=True)
+    return recorders
