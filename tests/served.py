@@ -13,8 +13,8 @@ from mapspeak.memory import MemoryStore, SemanticMapStore
 from mapspeak.robot import Robot
 from mapspeak.safety import Guard
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
-from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.wire.calllog import CallLog
 from mapspeak.session import Session
 
 MODES = ("auto", "legacy")

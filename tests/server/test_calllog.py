@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.server.calllog import CallLog
+from mapspeak.server.wire.calllog import CallLog
 from served import connect
 
 pytestmark = pytest.mark.anyio

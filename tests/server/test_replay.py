@@ -10,8 +10,8 @@ from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.errors import ConfigError, PolicyError
 from mapspeak.safety import Caller, Publish, calling
-from mapspeak.server.calllog import CallLog
 from mapspeak.server.view.replay import replay_log
+from mapspeak.server.wire.calllog import CallLog
 from served import connect
 
 ROOM = """

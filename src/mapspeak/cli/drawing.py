@@ -15,8 +15,8 @@ from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
     from mapspeak.ros.port import RosConnection
-    from mapspeak.server.calllog import CallNoting
     from mapspeak.server.view.recording import Recorder
+    from mapspeak.server.wire.calllog import CallNoting
     from mapspeak.session import Session
 
 DEFAULT_FOXGLOVE = "127.0.0.1:8765"
@@ -96,8 +96,8 @@ def _open_recorders(choice: DrawingChoice, links: AsyncExitStack) -> "list[Recor
             "--record and --foxglove need a package that is not installed.",
             hint=f"Install it: {say_install('foxglove')}",
         )
-    from mapspeak.server.transport import is_loopback, parse_address  # noqa: PLC0415 - heavy
     from mapspeak.server.view.recording import record_to, serve_foxglove  # noqa: PLC0415 - optional
+    from mapspeak.server.wire.doors import is_loopback, parse_address  # noqa: PLC0415 - heavy
 
     recorders = []
     if choice.record is not None:

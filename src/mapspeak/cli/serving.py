@@ -40,8 +40,8 @@ from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
     from mapspeak.server.app import MapspeakServer
-    from mapspeak.server.calllog import CallNoting
     from mapspeak.server.mapview.representations import Representation
+    from mapspeak.server.wire.calllog import CallNoting
     from mapspeak.session import Session
 
 TOKEN_VARIABLE = "MAPSPEAK_HTTP_TOKEN"  # noqa: S105 - the variable's name, not a token
@@ -213,9 +213,9 @@ def serve(
 
 
 async def _serve(options: ServeOptions) -> None:
-    from mapspeak.server.calllog import CallLog  # noqa: PLC0415
     from mapspeak.server.fleet import FleetServer  # noqa: PLC0415
     from mapspeak.server.transport import serve_http, serve_stdio  # noqa: PLC0415
+    from mapspeak.server.wire.calllog import CallLog  # noqa: PLC0415
 
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
     lease_s = math.inf if options.http is None else options.lease_s

@@ -18,10 +18,10 @@ from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
-    from mapspeak.server.calllog import CallLog
     from mapspeak.server.view.desk import ViewDesk, ViewRequest
     from mapspeak.server.view.feed import ViewFeed
     from mapspeak.server.view.keys import PageKeys
+    from mapspeak.server.wire.calllog import CallLog
     from mapspeak.session import Session
 
 DEFAULT_VIEW = "127.0.0.1:8767"

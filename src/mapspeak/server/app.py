@@ -26,7 +26,6 @@ from mapspeak import __version__
 from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
-from mapspeak.server.calllog import CallNoting
 from mapspeak.server.listening import ListHearers
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts
@@ -40,6 +39,8 @@ from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import STOP, build_toolsets, choose_tools
+from mapspeak.server.view.chat import VIEW_MAP, ChatView, make_apps, offer_page
+from mapspeak.server.wire.calllog import CallNoting
 from mapspeak.session import Session
 from mapspeak.skills.owners.skillsfile import OwnersEntry
 from mapspeak.skills.runs import SkillRuns
@@ -82,7 +83,9 @@ class MapspeakServer(MCPServer[Any]):
             instructions=instructions,
             version=__version__,
             log_level="WARNING",
+            extensions=[make_apps()],
         )
+        self.add_tool(ChatView(session).view_map, name=VIEW_MAP, structured_output=False)
         self._session = session
         self._call_log = call_log
         self._arguments: dict[str, frozenset[str]] = {}
@@ -113,6 +116,8 @@ class MapspeakServer(MCPServer[Any]):
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
         """Call a tool; what went wrong on purpose reaches the model with its hint."""
+        if name == VIEW_MAP:
+            return await super().call_tool(name, arguments, context)
         former = self._former.get(name, {})
         arguments = {
             key if former.get(key, key) in arguments else former[key]: value
@@ -253,7 +258,7 @@ class MapspeakServer(MCPServer[Any]):
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
     ) -> ListToolsResult:
         self.hearers.note(ctx)
-        return await super()._handle_list_tools(ctx, params)
+        return offer_page(await super()._handle_list_tools(ctx, params), ctx)
 
     async def list_tools(self) -> list[ListedTool]:
         """List the tools with schemas freed of what no model needs."""
@@ -266,6 +271,7 @@ class MapspeakServer(MCPServer[Any]):
                 }
             )
             for tool in listed
+            if tool.name != VIEW_MAP
         ]
         return [*lean, *self.skills.listed]
 

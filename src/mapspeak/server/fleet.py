@@ -25,6 +25,7 @@ from mapspeak.server.app import MapspeakServer
 from mapspeak.server.listening import ListHearers
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.toolsets import STOP
+from mapspeak.server.view.chat import make_apps, offer_page
 
 ARGUMENT = "robot"
 
@@ -52,6 +53,7 @@ class FleetServer(MCPServer[Any]):
             f"Each has its own map, memory and ids; every tool takes `{ARGUMENT}`.",
             version=__version__,
             log_level="WARNING",
+            extensions=[make_apps()],
         )
         self._servers = dict(servers)
         self._hearers = ListHearers(self)
@@ -63,7 +65,8 @@ class FleetServer(MCPServer[Any]):
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
     ) -> ListToolsResult:
         self._hearers.note(ctx)
-        return await super()._handle_list_tools(ctx, params)
+        listed = await super()._handle_list_tools(ctx, params)
+        return offer_page(listed, ctx, robots=list(self._servers))
 
     async def list_tools(self) -> list[ListedTool]:
         """List each tool once, with the names of the robots that have it."""

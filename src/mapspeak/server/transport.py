@@ -1,9 +1,7 @@
 """How a server reaches its clients: stdio, or streaming HTTP with its doors closed by default."""
 
-import ipaddress
 import logging
 import secrets
-import socket
 from collections.abc import AsyncIterable, Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
@@ -12,19 +10,26 @@ import anyio
 import uvicorn
 from anyio.streams.memory import MemoryObjectSendStream
 from mcp.server.stdio import stdio_server
-from mcp.server.transport_security import TransportSecurityMiddleware, TransportSecuritySettings
 from mcp.shared.message import SessionMessage
 from mcp_types import INVALID_REQUEST, PARSE_ERROR, ErrorData, JSONRPCError
 from pydantic import ValidationError
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mapspeak.errors import ConfigError
 from mapspeak.server.app import MapspeakServer
 from mapspeak.server.fleet import FleetServer
+from mapspeak.server.wire.doors import (
+    HEALTH,
+    HostGuard,
+    ReadyServer,
+    find_security,
+    is_loopback,
+    listen,
+    parse_address,
+)
 
-HEALTH = "/health"
 PUBLIC = ("/", HEALTH)
 HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 
@@ -114,19 +119,6 @@ def shorten_disconnect(record: logging.LogRecord) -> bool:
     return True
 
 
-class ReadyServer(uvicorn.Server):
-    """Says when it answers."""
-
-    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
-        super().__init__(config)
-        self._on_ready = on_ready
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to answer."""
-        await super().startup(sockets)
-        self._on_ready()
-
-
 class HangUpWatch:
     """Notices a client that is gone before its answer was, or that ends its session.
 
@@ -165,23 +157,6 @@ class HangUpWatch:
             await self._on_hang_up(client)
 
 
-class HostGuard:
-    """Lets only requests through that name this server, before anything is done for them."""
-
-    def __init__(self, app: ASGIApp, security: TransportSecuritySettings) -> None:
-        self._app = app
-        self._security = TransportSecurityMiddleware(security)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on, or answer 421 or 403."""
-        if scope["type"] == "http" and scope["path"] != HEALTH:
-            refusal = await self._security.validate_request(Request(scope))
-            if refusal is not None:
-                await refusal(scope, receive, send)
-                return
-        await self._app(scope, receive, send)
-
-
 class TokenGuard:
     """Lets only requests through that carry the bearer token."""
 
@@ -216,57 +191,3 @@ async def _say_where(_request: object) -> PlainTextResponse:
         "This is mapspeak, a robot for language models.\n"
         "MCP clients connect to /mcp on this address (streaming HTTP); /health answers ok.\n"
     )
-
-
-def find_security(host: str, port: int) -> TransportSecuritySettings:
-    """Return which Host and Origin headers are let through at an address."""
-    if not is_loopback(host):
-        # The token is what guards here; the names by which others reach this machine are unknown.
-        return TransportSecuritySettings(enable_dns_rebinding_protection=False)
-    names = {host, "localhost", "127.0.0.1", "[::1]"}
-    return TransportSecuritySettings(
-        enable_dns_rebinding_protection=True,
-        allowed_hosts=[f"{name}:{port}" for name in sorted(names)],
-        allowed_origins=[f"http://{name}:{port}" for name in sorted(names)],
-    )
-
-
-def parse_address(address: str) -> tuple[str, int]:
-    """Return host and port.
-
-    Raises:
-        ConfigError: It is no HOST:PORT.
-    """
-    host, _, port = address.rpartition(":")
-    host = host.strip("[]") or "127.0.0.1"
-    if not port.isdecimal() or not 0 < int(port) < 65536:
-        raise ConfigError(
-            f"{address!r} is no address to serve on.", hint="Give HOST:PORT, as 127.0.0.1:8766."
-        )
-    return host, int(port)
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens there.
-
-    Raises:
-        ConfigError: Another program has it, or this machine does not have that address.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    try:
-        return socket.create_server((host, port), family=family)
-    except OSError as error:
-        raise ConfigError(
-            f"{host}:{port} cannot be served on: {error.strerror or error}.",
-            hint="Choose another port, or end the program that has this one.",
-        ) from error
-
-
-def is_loopback(host: str) -> bool:
-    """Return True for an address that only this machine can reach."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False

@@ -9,8 +9,8 @@ from typing import Any
 
 from mcp_types import ImageContent, TextContent
 
-from mapspeak.server.calllog import CallNote, CallNoting
 from mapspeak.server.view.document import CallView
+from mapspeak.server.wire.calllog import CallNote, CallNoting
 
 MOST_CALLS = 100
 MOST_WITH_PICTURES = 30

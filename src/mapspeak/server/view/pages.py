@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from enum import StrEnum
 from html import escape
 from importlib import resources
+from importlib.resources.abc import Traversable
 from string import Template
 
 from mapspeak.server.view.document import ViewPart
-
-PAGE = resources.files(__package__).joinpath("page")
-LEAFLET = resources.files("xstatic.pkg.leaflet").joinpath("data")
 
 
 class PageKind(StrEnum):
@@ -27,6 +25,16 @@ SCRIPTS = {
     PageKind.CHAT: ("map.js", "calls.js", "app.js"),
     PageKind.REPLAY: ("map.js", "calls.js", "replay.js"),
 }
+
+
+def find_page_files() -> Traversable:
+    """Return the folder of the viewer's own files."""
+    return resources.files(__package__).joinpath("page")
+
+
+def find_leaflet_files() -> Traversable:
+    """Return the folder of Leaflet's files."""
+    return resources.files("xstatic.pkg.leaflet").joinpath("data")
 
 
 def link_page() -> bytes:
@@ -67,7 +75,7 @@ def build_replay_page(title: str, replay: ViewPart) -> bytes:
 
 
 def _fill(kind: PageKind, title: str, head: Sequence[str], tail: Sequence[str]) -> bytes:
-    template = Template(PAGE.joinpath("page.html").read_text("utf-8"))
+    template = Template(find_page_files().joinpath("page.html").read_text("utf-8"))
     parts = {"head": "\n".join(head), "tail": "\n".join(tail)}
     page = template.substitute(parts, kind=kind, title=escape(title))
     return page.encode(errors="replace")
@@ -75,10 +83,11 @@ def _fill(kind: PageKind, title: str, head: Sequence[str], tail: Sequence[str]) 
 
 def _read_parts(kind: PageKind) -> tuple[str, str]:
     """Return all styles and all scripts of a page, each as one text."""
-    leaflet = [LEAFLET.joinpath(name).read_text("utf-8") for name in ("leaflet.css", "leaflet.js")]
-    scripts = [PAGE.joinpath(name).read_text("utf-8") for name in SCRIPTS[kind]]
-    style = leaflet[0] + PAGE.joinpath("view.css").read_text("utf-8")
-    return style, "\n".join([leaflet[1], *scripts])
+    own, leaflet = find_page_files(), find_leaflet_files()
+    styles = (leaflet.joinpath("leaflet.css"), own.joinpath("view.css"))
+    scripts = (leaflet.joinpath("leaflet.js"), *map(own.joinpath, SCRIPTS[kind]))
+    style, script = ("\n".join(each.read_text("utf-8") for each in f) for f in (styles, scripts))
+    return style, script
 
 
 def _hash(inline: str) -> str:

@@ -8,7 +8,10 @@ import anyio
 import uvicorn
 
 from mapspeak.errors import ConfigError
-from mapspeak.server.transport import (
+from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.keys import PageKeys
+from mapspeak.server.view.site import build_site
+from mapspeak.server.wire.doors import (
     HostGuard,
     ReadyServer,
     find_security,
@@ -16,9 +19,6 @@ from mapspeak.server.transport import (
     listen,
     parse_address,
 )
-from mapspeak.server.view.feed import ViewFeed
-from mapspeak.server.view.keys import PageKeys
-from mapspeak.server.view.site import build_site
 
 
 async def serve_view(

@@ -19,7 +19,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.server.view.commands import PersonCommands
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import NOBODY, PageKeys
-from mapspeak.server.view.pages import LEAFLET, PAGE, link_page
+from mapspeak.server.view.pages import find_leaflet_files, find_page_files, link_page
 from mapspeak.server.view.tiles import draw_tile
 
 ONLY = "robot"
@@ -76,11 +76,11 @@ class LiveSite:
 
     async def show_file(self, request: Request) -> Response:
         """Answer with a file of the page."""
-        return _file(PAGE, request.path_params["file"])
+        return _file(find_page_files(), request.path_params["file"])
 
     async def show_leaflet(self, request: Request) -> Response:
         """Answer with a file of Leaflet."""
-        return _file(LEAFLET, request.path_params["file"])
+        return _file(find_leaflet_files(), request.path_params["file"])
 
     async def list_robots(self, _request: Request) -> Response:
         """Answer with the names of the robots."""
