@@ -1,9 +1,11 @@
 """A server process as benchmarks speak to it."""
 
 import json
+import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 __all__ = ["HELLO", "ServerProcess"]
@@ -57,6 +59,16 @@ class ServerProcess:
         line = json.dumps({"jsonrpc": "2.0", "method": method, **fields})
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()
+
+    def cpu_s(self) -> float:
+        """Return the seconds of CPU that the process has used, where Linux tells."""
+        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def peak_mb(self) -> float:
+        """Return the most memory that the process has held at once, where Linux tells."""
+        status = Path(f"/proc/{self._process.pid}/status").read_text()
+        return int(status.partition("VmHWM:")[2].split()[0]) / 1e3
 
     def close(self) -> None:
         """End the server as clients do, and wait for it."""

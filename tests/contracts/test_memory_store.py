@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -136,6 +136,22 @@ def test_what_many_remember_of_one_place_at_once_is_all_there(open_store: OpenSt
 
     (dock,) = stores[0].read().waypoints
     assert {each.label for each in dock.landmarks} == {f"thing {number}" for number in range(12)}
+
+
+def test_the_later_of_two_looks_counts_whatever_the_clocks_of_the_robots_say(
+    open_store: OpenStore,
+) -> None:
+    noon = datetime(2026, 11, 2, 12, tzinfo=UTC)
+    ahead, behind = open_store("b1"), open_store("b1")
+    ahead.remember(replace(place("dock", 1.0, HOSE), recorded_at=noon, description="Old."))
+
+    an_hour_ago = noon - timedelta(hours=1)
+    behind.remember(replace(place("dock", 1.0, TAP), recorded_at=an_hour_ago, description="New."))
+
+    (dock,) = ahead.read().waypoints
+    assert (dock.description, dock.recorded_at) == ("New.", an_hour_ago)
+    seen = {each.label: dock.dated(each).recorded_at for each in dock.landmarks}
+    assert seen == {"tap": an_hour_ago, "hose": noon}
 
 
 def test_many_waypoints_are_written_together_or_not_at_all(store: MemoryStore) -> None:

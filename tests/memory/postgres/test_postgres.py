@@ -161,6 +161,29 @@ def test_a_migration_that_fails_leaves_nothing_behind(
     assert names(store) == ["dock"]
 
 
+def test_a_database_whose_disk_is_full_refuses_a_write_and_takes_the_next(
+    address: str, store: PostgresStore
+) -> None:
+    store.write(place("dock"))
+    with psycopg.connect(address, autocommit=True) as other:
+        other.execute(
+            "CREATE FUNCTION fill() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
+            " RAISE EXCEPTION 'could not extend file: No space left on device'"
+            " USING ERRCODE = 'disk_full'; END $$"
+        )
+        other.execute(
+            "CREATE TRIGGER full_disk BEFORE INSERT ON mapspeak.records EXECUTE FUNCTION fill()"
+        )
+
+        with pytest.raises(SemanticMapError, match="No space left on device"):
+            store.remember(place("hall"))
+        assert names(store) == ["dock"]
+        other.execute("DROP TRIGGER full_disk ON mapspeak.records")
+
+    store.remember(place("hall"))
+    assert names(store) == ["dock", "hall"]
+
+
 def test_a_row_that_somebody_spoiled_is_named(
     address: str, store: PostgresStore, tmp_path: Path
 ) -> None:

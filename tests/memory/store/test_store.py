@@ -1,5 +1,7 @@
 import os
+import signal
 import stat
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -192,6 +194,27 @@ def test_a_write_that_fails_leaves_the_file_as_it_was(store: SemanticMapStore, p
         store.write(place("hall"))
     assert path.read_bytes() == before
     assert names(store) == ["dock"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs limits of processes")
+def test_a_disk_that_is_full_leaves_the_file_as_it_was(store: SemanticMapStore, path: Path) -> None:
+    import resource  # noqa: PLC0415 - there is none on Windows
+
+    store.write(place("dock"))
+    before = path.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before), limits[1]))
+    try:
+        with pytest.raises(SemanticMapError, match="Cannot write"):
+            store.write(place("hall"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, ignored)
+
+    assert path.read_bytes() == before
+    store.write(place("hall"))
+    assert names(store) == ["dock", "hall"]
 
 
 @pytest.mark.skipif(IS_ROOT, reason="root may write anything")

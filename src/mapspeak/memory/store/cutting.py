@@ -6,7 +6,7 @@ dashes of its lists, and what mapspeak wrote itself is read by a few patterns.
 
 import json
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from mapspeak.memory.store.yamltext import Data
@@ -84,7 +84,10 @@ def split_end(item: str, indent: int) -> tuple[str, str]:
 _ENTRY = re.compile(r"([a-z_]+):(?: +(\S.*))?")
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 _TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(?:Z|[+-]\d\d:\d\d)")
-_QUOTED = re.compile(r'"(?:[^"\\]|\\["\\n])*"')
+_QUOTE = r'"(?:[^"\\]|\\["\\n])*"'
+_QUOTED = re.compile(_QUOTE)
+_FLOW_ENTRY = re.compile(rf"([a-z_]+): (\{{[^{{}}]*\}}|{_QUOTE}|[^,{{}}\[\]\"]+)(?:, (?=.)|\Z)")
+_FLOW_ITEM = re.compile(rf"({_QUOTE}|[^,{{}}\[\]\"]+)(?:, (?=.)|\Z)")
 
 
 class _UnsureError(Exception):
@@ -128,7 +131,7 @@ def _read_value(text: str) -> Data:
     if text == "[]":
         return []
     if text.startswith("[") and text.endswith("]"):
-        return [_read_flow_scalar(item) for item in text[1:-1].split(", ")]
+        return [_read_flow_scalar(item[1]) for item in _read_flow(_FLOW_ITEM, text[1:-1])]
     if text.startswith("{") and text.endswith("}"):
         return _read_flow_mapping(text[1:-1])
     if _QUOTED.fullmatch(text):
@@ -137,17 +140,30 @@ def _read_value(text: str) -> Data:
     return text
 
 
+def _read_flow(pattern: re.Pattern[str], text: str) -> Iterator[re.Match[str]]:
+    """Return the parts of what stands within brackets."""
+    at = 0
+    while at < len(text):
+        part = pattern.match(text, at)
+        if part is None:
+            raise _UnsureError
+        yield part
+        at = part.end()
+
+
 def _read_flow_mapping(text: str) -> Data:
     mapping: dict[str, Data] = {}
-    for part in text.split(", "):
-        entry = _ENTRY.fullmatch(part)
-        if entry is None or entry[2] is None or entry[1] in mapping:
-            raise _UnsureError
-        mapping[entry[1]] = _read_flow_scalar(entry[2])
+    for key, value in (part.groups() for part in _read_flow(_FLOW_ENTRY, text)):
+        _sure(key not in mapping)
+        is_mapping = value.startswith("{")
+        mapping[key] = _read_flow_mapping(value[1:-1]) if is_mapping else _read_flow_scalar(value)
+    _sure(mapping)
     return mapping
 
 
 def _read_flow_scalar(text: str) -> str:
+    if text.startswith('"'):
+        return str(json.loads(text))
     _sure(is_plain_in_flow(text) or _NUMBER.fullmatch(text) or _TIME.fullmatch(text))
     return text
 

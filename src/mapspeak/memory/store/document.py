@@ -4,7 +4,7 @@ A record whose text was seen before is not read again. A write changes the text 
 the head of one section; every other character stays.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
@@ -91,11 +91,13 @@ class MapDocument(Contents):
         said = self.root.get(key)
         return said if isinstance(said, str) else None
 
-    def _texts(self, sections: Iterable[Section]) -> Iterator[str]:
+    def _texts(self, sections: Iterable[Section]) -> list[str]:
+        texts = list[str]()
         for section in sections:
-            yield section.head
+            texts.append(section.head)
             if section.key in LISTS:
-                yield from (item.text or "" for item in self.lists[section.key].values())
+                texts += [item.text or "" for item in self.lists[section.key].values()]
+        return texts
 
     # --- changes ---------------------------------------------------------------------------------
 
@@ -130,19 +132,17 @@ class MapDocument(Contents):
         if item is not None:
             if item.text is None or section is None:
                 raise self._layout_fault(list_key)
-            old = data_of(item.record)
-            text = edited_item(item.text, indent=section.indent, old=old, new=data)
+            text = _changed_text(item.text, data_of(item.record), data, section.indent)
             new = self._read_item(list_key, text, data)
             return replace(self, lists={**self.lists, list_key: {**items, key: new}})
-        shown = {name: said for name, said in data.items() if said or name not in _LEFT_OUT}
         if section is None:
-            text = record_text(shown, indent=2)
+            text = _new_text(data, 2)
             at = self._find_places() if list_key == "frames" else len(self.sections)
             return self._with_section(Section(key=list_key, head=f"{list_key}:\n" + text), at)
         if not items:
-            return self._with_first(section, record_text(shown, indent=2))
-        text = record_text(shown, indent=section.indent)
-        return self._with_last(section, self._read_item(list_key, text, data))
+            return self._with_first(section, _new_text(data, 2))
+        new = self._read_item(list_key, _new_text(data, section.indent), data)
+        return self._with_last(section, new)
 
     def without_place(self, key: str) -> "MapDocument":
         """Return the file without the record of a `name_key`.
@@ -237,6 +237,21 @@ class MapDocument(Contents):
             f"`- {FIRST_KEYS[list_key]}: ...`, its other keys on lines of their own. Nothing was "
             "written.",
         )
+
+
+def _new_text(data: dict[str, Data], indent: int) -> str:
+    """Return the text of a record that mapspeak writes."""
+    shown = {name: said for name, said in data.items() if said or name not in _LEFT_OUT}
+    return record_text(shown, indent=indent)
+
+
+def _changed_text(text: str, old: dict[str, Data], new: dict[str, Data], indent: int) -> str:
+    """Return the text of a record that is to say something else."""
+    own, rest = _new_text(old, indent), text.lstrip("\n")
+    if rest.startswith(own) and not rest[len(own) :].strip("\n"):
+        # No one else had a hand in it.
+        return text.replace(own, _new_text(new, indent))
+    return edited_item(text, indent=indent, old=old, new=new)
 
 
 def _joined_ends(text: str, rest: str) -> str:
