@@ -74,4 +74,4 @@ class ServerProcess:
         """End the server as clients do, and wait for it."""
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         self._process.stdin.close()
-        self._process.wait(timeout=30)
+        self._process.wait(timeout=300)

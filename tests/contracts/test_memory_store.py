@@ -169,44 +169,6 @@ def test_many_waypoints_are_written_together_or_not_at_all(store: MemoryStore) -
     assert names(store) == ["dock", "hall"]
 
 
-# --- forgetting ------------------------------------------------------------------------------
-
-
-def test_a_removed_waypoint_is_forgotten_by_all_and_can_be_written_again(
-    store: MemoryStore, open_store: OpenStore
-) -> None:
-    other = open_store("b1")
-    for name in ("dock", "hall", "gate"):
-        store.write(place(name, 1.0, HOSE))
-    assert names(other) == ["dock", "hall", "gate"]
-
-    removed = store.remove(" HALL")
-
-    assert removed is not None
-    assert removed.name == "hall"
-    assert names(store) == names(other) == ["dock", "gate"]
-    assert other.write(removed).waypoint == removed
-    assert set(names(store)) == {"dock", "gate", "hall"}
-
-
-def test_all_waypoints_can_be_removed_and_new_ones_written(store: MemoryStore) -> None:
-    for name in ("dock", "hall"):
-        store.write(place(name))
-    for name in ("hall", "dock"):
-        store.remove(name)
-    assert names(store) == []
-
-    store.write(place("gate"))
-    assert names(store) == ["gate"]
-
-
-def test_removing_what_no_one_remembers_changes_nothing(store: MemoryStore) -> None:
-    store.write(place("dock"))
-
-    assert store.remove("hall") is None
-    assert names(store) == ["dock"]
-
-
 # --- events ----------------------------------------------------------------------------------
 
 

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Mapping
 from importlib import import_module
+from typing import Any
 
 import click
 
@@ -19,7 +20,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     ),
     "eval": ("evaluating:evaluate", "run and score tasks in simulated worlds"),
     "map": ("mapping:map_command", "show map files as a model sees a map; no robot is needed"),
-    "memory": ("memory:memory", "look at, edit, check and share what a robot remembers"),
+    "memory": ("commands:memory", "look at, edit, check and share what a robot remembers"),
     "release": ("operating:release", "let held robots drive again"),
     "replay": ("operating:replay", "show an audit log: who wanted what, and what became of it"),
     "serve": ("serving:serve", "offer a robot to a language model, over MCP"),
@@ -31,29 +32,53 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
 """Where each command is, and what it does; a module is imported when its command is wanted."""
 
 
+MEMORY_COMMANDS: Mapping[str, tuple[str, str]] = {
+    "check": ("memory.asking:check", "check the file, and on a map whether it can be true"),
+    "copy": ("memory.places:copy", "copy a memory into an empty one, file or database"),
+    "episodes": ("memory.episodes:episodes", "list what was observed, when and from where"),
+    "export": ("memory.places:export", "write the places as GeoJSON"),
+    "find": ("memory.asking:find", "find the places and things that words may mean"),
+    "forget": ("memory.places:forget", "forget a place, or all landmarks of a label; or undo it"),
+    "import": ("memory.places:import_", "join exported, perhaps edited GeoJSON into the memory"),
+    "list": ("memory.places:list_", "list all places"),
+    "merge": ("memory.places:merge", "join two files and their observations into a new one"),
+    "show": ("memory.places:show", "show all that is known of a place"),
+}
+
+
 class CommandGroup(click.Group):
-    """All commands, by name."""
+    """Commands by name, each imported when it is wanted."""
+
+    def __init__(self, *, table: Mapping[str, tuple[str, str]], **settings: Any) -> None:  # noqa: ANN401 - click's own
+        super().__init__(**settings)
+        self._table = table
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - as in click
         """Return the names of all commands."""
-        return list(COMMANDS)
+        return list(self._table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - as in click
         """Import a command; None where there is none of that name."""
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self._table:
             return None
-        module, _, name = COMMANDS[cmd_name][0].partition(":")
+        module, _, name = self._table[cmd_name][0].partition(":")
         command: click.Command = getattr(import_module(f"mapspeak.cli.{module}"), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as in click
         """Write what each command does, without importing it."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, what) for name, (_, what) in COMMANDS.items()])
+            formatter.write_dl([(name, what) for name, (_, what) in self._table.items()])
+
+
+@click.group(cls=CommandGroup, table=MEMORY_COMMANDS)
+def memory() -> None:
+    """Look at, check and share a memory of places: a semantic map file and its episodes."""
 
 
 @click.group(
     cls=CommandGroup,
+    table=COMMANDS,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

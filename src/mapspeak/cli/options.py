@@ -289,3 +289,8 @@ def read_representation(
     if value not in set(Representation):
         raise click.BadParameter(f"choose from {', '.join(Representation)}")
     return Representation(value)
+
+
+def is_database(name: str) -> bool:
+    """Return True for the address of a database, False for a file."""
+    return name.startswith(("postgresql://", "postgres://"))

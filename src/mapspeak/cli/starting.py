@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mapspeak.cli.episodes import keep_usual_memory, open_store
 from mapspeak.cli.options import GuardChoice, build_guard, data_folder
 from mapspeak.cli.robots import (
     RobotChoice,
@@ -96,7 +95,11 @@ async def open_session(
         scratch: A folder for a memory that does not last.
         lease_s: Without a client for so long, a driving robot is stopped.
     """
-    from mapspeak.session import Session  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.cli.memory.which import (  # noqa: PLC0415 - heavy; help must be quick
+        keep_usual_memory,
+        open_store,
+    )
+    from mapspeak.session import Session  # noqa: PLC0415 - likewise
 
     choice = start.choice
     guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)

@@ -71,26 +71,6 @@ def test_an_edit_by_hand_is_seen(store: SemanticMapStore, path: Path) -> None:
     assert "name: loading dock  # renamed\n" in path.read_text()
 
 
-def test_a_removed_record_leaves_the_comments_and_blank_lines_around_it(
-    store: SemanticMapStore, path: Path
-) -> None:
-    pose = "    pose: {x: 0, y: 0, yaw_deg: 0}\n"
-    head, tail = f"waypoints:\n  - name: a\n{pose}\n# b:\n", f"\n  - name: c  # mine\n{pose}"
-    path.write_text(f"{head}\n  - name: b  # gone\n{pose}{tail}map: b1\n")
-
-    store.remove("b")
-
-    assert path.read_text() == f"{head}{tail}map: b1\n"
-
-
-def test_a_record_in_a_list_in_brackets_is_not_removed(store: SemanticMapStore, path: Path) -> None:
-    path.write_text("waypoints: [{name: a, pose: {x: 0, y: 0, yaw_deg: 0}}]\n")
-
-    with pytest.raises(SemanticMapError, match="cannot write to it"):
-        store.remove("a")
-    assert names(store) == ["a"]
-
-
 def test_an_unchanged_file_is_not_read_again(store: SemanticMapStore) -> None:
     store.write(place("dock"))
 

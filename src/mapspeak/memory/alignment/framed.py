@@ -7,7 +7,6 @@ robot's map is no waypoint, no event and no thing to whoever reads here.
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from pathlib import Path
 
 from mapspeak.geometry import Pose
 from mapspeak.memory.alignment.keeping import FrameKeeper
@@ -15,8 +14,7 @@ from mapspeak.memory.episodes.observation import MapPlacing
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import FrameId, Frames
 from mapspeak.memory.merging import Merge
-from mapspeak.memory.store.memorystore import MemoryStore, WriteReceipt
-from mapspeak.memory.walls import KeptWalls
+from mapspeak.memory.store.memorystore import MemoryStore, Records, Result, WriteReceipt
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 
@@ -24,7 +22,7 @@ MOST_KEPT = 4
 """So many moved records are kept for each that there is."""
 
 
-class FramedMemory:
+class FramedMemory(MemoryStore):
     """A memory store whose reader and writer are on the robot's map.
 
     Attributes:
@@ -39,24 +37,10 @@ class FramedMemory:
         name_robot: Callable[[], str] = str,
         lock: AbstractContextManager[object] | None = None,
     ) -> None:
+        super().__init__(path=store.path, walls=store.walls, map_id=store.map_id)
         self.store = store
         self.keeper = FrameKeeper(store, name_robot=name_robot, lock=lock)
         self._moved: dict[int, tuple[Waypoint, Pose, Waypoint]] = {}
-
-    @property
-    def path(self) -> Path:
-        """As of the store."""
-        return self.store.path
-
-    @property
-    def walls(self) -> KeptWalls:
-        """As of the store."""
-        return self.store.walls
-
-    @property
-    def map_id(self) -> str | None:
-        """As of the store."""
-        return self.store.map_id
 
     def meet(self, grid: OccupancyGrid) -> None:
         """Find out which frame the robot's map is in (see `FrameKeeper.meet`)."""
@@ -140,18 +124,20 @@ class FramedMemory:
         """Write a waypoint that is in the frame of the robot's map."""
         return self._received(self.store.write(self._in_frame(waypoint)))
 
-    def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
-        """Write many waypoints, each in the frame that it names."""
-        self.store.write_all(change)
+    def change(
+        self,
+        change: Callable[[Records], Result],
+        *,
+        alone: bool = False,
+        binding: str | None = None,
+    ) -> Result:
+        """Change records, each in the frame that it names."""
+        return self.store.change(change, alone=alone, binding=binding)
 
     def write_event(self, event: Event) -> Event:
         """Write an event that is in the frame of the robot's map."""
         written = self.store.write_event(replace(event, frame=self.keeper.place()))
         return next(each for each in self.read_events() if each.id == written.id)
-
-    def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
-        """As of the store."""
-        return self.store.write_frames(change)
 
     def remember(
         self, waypoint: Waypoint, *, gone: Iterable[str] = ()
@@ -159,10 +145,6 @@ class FramedMemory:
         """Join a waypoint that is in the frame of the robot's map with what is remembered."""
         receipt, merge = self.store.remember(self._in_frame(waypoint), gone=gone)
         return self._received(receipt), merge
-
-    def remove(self, name: str) -> Waypoint | None:
-        """As of the store."""
-        return self.store.remove(name)
 
     def _in_frame(self, waypoint: Waypoint) -> Waypoint:
         return replace(waypoint, frame=self.keeper.place())

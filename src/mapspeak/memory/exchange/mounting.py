@@ -95,7 +95,8 @@ def mount(first: MemoryStore, second: MemoryStore) -> Mount:
             pose=frame.pose,
             reference=ids.get(frame.reference, frame.reference),
         )
-    return _with_walls(frames, ids, mine, theirs, finding)
+    own_name = first.read_entry(KEY) or OWN_WALLS
+    return _with_walls(frames, ids, mine, theirs, finding, own_name)
 
 
 def _with_walls(
@@ -104,12 +105,13 @@ def _with_walls(
     mine: Mapping[FrameId, OccupancyGrid],
     theirs: Mapping[FrameId, OccupancyGrid],
     finding: str,
+    own_name: str,
 ) -> Mount:
     """Return the mount with a name for each kept map; of two of one frame the first's is kept."""
     kept = {ids[frame_id]: grid for frame_id, grid in theirs.items()} | dict(mine)
     walls = {}
     for number, (frame_id, grid) in enumerate(kept.items(), start=2):
-        name = OWN_WALLS if frame_id is None else f"map-{number}.yaml"
+        name = own_name if frame_id is None else f"map-{number}.yaml"
         walls[name] = grid
         if frame_id is not None:
             frames = frames.changed(frame_id, walls=name)

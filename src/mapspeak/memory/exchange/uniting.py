@@ -7,7 +7,6 @@ from itertools import count
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.alignment.keeping import KEY
 from mapspeak.memory.episodes.store import BroughtOver, bring_over
 from mapspeak.memory.events import Event
 from mapspeak.memory.exchange.mounting import Mount, mount
@@ -18,7 +17,7 @@ from mapspeak.memory.store.durable import sync_folder
 from mapspeak.memory.store.memorystore import MemoryStore
 from mapspeak.memory.store.records import data_of
 from mapspeak.memory.store.semanticmap import SemanticMapStore
-from mapspeak.memory.walls import OWN_WALLS, WallFolder
+from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 SAME_PLACE_M = 1.0
@@ -215,5 +214,3 @@ def _fill(whole: SemanticMapStore, union: Union, mounted: Mount, events: Iterabl
     for event in map(mounted.rename_event, events):
         if event not in known:
             whole.write_event(event)
-    if whole.read_entry(KEY) is not None:
-        whole.write_entry(KEY, OWN_WALLS)

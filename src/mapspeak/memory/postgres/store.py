@@ -20,8 +20,8 @@ from mapspeak.memory.frames import NO_FRAMES, Frames, MapFrame
 from mapspeak.memory.postgres.database import Database
 from mapspeak.memory.postgres.walls import DatabaseWalls
 from mapspeak.memory.quoting import name_key
+from mapspeak.memory.store.memorystore import MemoryStore, OneRecord, Records, Result
 from mapspeak.memory.store.records import data_of, key_of, list_key_of, read_record
-from mapspeak.memory.store.writing import OneRecord, Records, RecordStore, Result
 from mapspeak.memory.store.yamltext import Data
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
@@ -76,7 +76,7 @@ class _Known:
         )
 
 
-class PostgresStore(RecordStore):
+class PostgresStore(MemoryStore):
     """The memory of places in one PostgreSQL database.
 
     Args:
@@ -117,7 +117,7 @@ class PostgresStore(RecordStore):
         """End the connection; the next call makes another."""
         self._database.close()
 
-    def _change(
+    def change(
         self,
         change: Callable[[Records], Result],
         *,
@@ -227,10 +227,6 @@ class _Rows:
         rows = [(_PLACE, name_key(each.name), Jsonb(data_of(each))) for each in waypoints]
         with self._connection.cursor() as cursor:
             cursor.executemany(_UPSERT, rows)
-
-    def remove(self, key: str) -> None:
-        """Forget the place with a `name_key`; its row stays, and says nothing."""
-        self._connection.execute(_UPSERT, (_PLACE, key, None))
 
 
 def _with_news(known: _Known, news: Sequence[tuple[str, str, int, str, Data]]) -> _Known:

@@ -144,30 +144,6 @@ class MapDocument(Contents):
         new = self._read_item(list_key, _new_text(data, section.indent), data)
         return self._with_last(section, new)
 
-    def without_place(self, key: str) -> "MapDocument":
-        """Return the file without the record of a `name_key`.
-
-        Raises:
-            SemanticMapError: The file is laid out in a way that cannot be written to.
-        """
-        items = dict(self.lists["waypoints"])
-        if key not in items:
-            return self
-        keys = list(items)
-        at, section = keys.index(key), next(s for s in self.sections if s.key == "waypoints")
-        item = items.pop(key)
-        if item.text is None:
-            raise self._layout_fault("waypoints")
-        _, rest = split_end(item.text, section.indent)
-        sections = self.sections
-        if at:
-            before = items[keys[at - 1]]
-            items[before.key] = replace(before, text=_joined_ends(before.text or "", rest))
-        else:
-            head = _joined_ends(section.head, rest)
-            sections = tuple(replace(s, head=head) if s is section else s for s in sections)
-        return replace(self, sections=sections, lists={**self.lists, "waypoints": items})
-
     def _with_last(self, section: Section, new: ListedRecord) -> "MapDocument":
         """Return the file with an item behind the last one, in front of what stands behind that."""
         items = dict(self.lists[section.key])
@@ -252,11 +228,6 @@ def _changed_text(text: str, old: dict[str, Data], new: dict[str, Data], indent:
         # No one else had a hand in it.
         return text.replace(own, _new_text(new, indent))
     return edited_item(text, indent=indent, old=old, new=new)
-
-
-def _joined_ends(text: str, rest: str) -> str:
-    """Return what stands behind two records, of which one goes: one blank line is enough."""
-    return text[:-1] + rest if text.endswith("\n\n") and rest.startswith("\n") else text + rest
 
 
 def _ended(text: str) -> str:

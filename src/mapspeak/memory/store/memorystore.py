@@ -1,15 +1,22 @@
-"""What every memory of places promises, wherever it keeps them."""
+"""What every memory of places promises and does alike, above the records that each keeps."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
+from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
-from mapspeak.memory.frames import Frames
-from mapspeak.memory.merging import Merge
+from mapspeak.memory.frames import Frames, MapFrame
+from mapspeak.memory.merging import Merge, merge_waypoint
+from mapspeak.memory.quoting import clean_line, name_key, quote_name
 from mapspeak.memory.walls import KeptWalls
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
+
+OneRecord = TypeVar("OneRecord", Waypoint, Event, MapFrame)
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,39 +31,88 @@ class WriteReceipt:
     previous: Waypoint | None
 
 
-class MemoryStore(Protocol):
+class Records(Protocol):
+    """The records of a memory while they are changed, all of it or nothing."""
+
+    @property
+    def map_id(self) -> str | None:
+        """The map that the memory says it is of."""
+
+    @property
+    def frames(self) -> Frames:
+        """All of them."""
+
+    def read(self) -> SemanticMap:
+        """Return all places."""
+
+    def read_events(self) -> Mapping[str, Event]:
+        """Return all events by their ids."""
+
+    def find_place(self, key: str) -> Waypoint | None:
+        """Return what is remembered under a `name_key`; no one else writes it from now on."""
+
+    def bind(self, map_id: str | None) -> None:
+        """Bind the memory to the map that its waypoints belong to, where it does not say one."""
+
+    def put(self, record: OneRecord) -> OneRecord:
+        """Write a record, in place of the one of its key; return it as it reads."""
+
+    def put_places(self, waypoints: Iterable[Waypoint]) -> None:
+        """Write many places."""
+
+
+class MemoryStore(ABC):
     """Places and events that outlive the server.
 
     All is synchronous, and safe between threads, processes and stores that are open at once. What
     changes something is done, and lasts, when it returns, or raises a `SemanticMapError` and
-    changed nothing: the memory has a fault, cannot be written, or is held
-    by another program.
+    changed nothing: the memory has a fault, cannot be written, or is held by another program.
+
+    Args:
+        path: The file, or what stands for it on this machine, beside which pictures and
+            observations lie.
+        walls: The walls of its frames.
+        map_id: The map that the robot is on. None takes the memory for what it says it is.
     """
 
-    @property
-    def path(self) -> Path:
-        """The file, or what stands for it, beside which pictures and observations lie."""
+    def __init__(self, *, path: Path, walls: KeptWalls, map_id: str | None) -> None:
+        self.path = path
+        self.walls = walls
+        self.map_id = clean_line(map_id or "") or None
 
-    @property
-    def map_id(self) -> str | None:
-        """The map that the robot is on; None takes the memory for what it says it is."""
-
-    @property
-    def walls(self) -> KeptWalls:
-        """The walls of its frames."""
-
+    @abstractmethod
     def read(self) -> SemanticMap:
         """Return all remembered places; cheap where nothing changed.
 
+        A memory that cannot be read since gives the places read before, with a warning.
+
         Raises:
-            SemanticMapError: The memory cannot be read, or has a fault and was never without one.
+            SemanticMapError: It cannot be read, or has a fault and was never without one.
         """
 
+    @abstractmethod
     def read_events(self) -> tuple[Event, ...]:
         """Return all events, also those that are over; as `read` otherwise."""
 
+    @abstractmethod
     def read_entry(self, key: str) -> str | None:
         """Return what the memory says under a key of its own, such as `snapshot`; as `read`."""
+
+    @abstractmethod
+    def change(
+        self,
+        change: Callable[[Records], Result],
+        *,
+        alone: bool = False,
+        binding: str | None = None,
+    ) -> Result:
+        """Change records, all of it or nothing, and return what the change does.
+
+        Args:
+            change: Called once or more often.
+            alone: No other writes meanwhile. Else none writes the places that are looked for.
+            binding: The map that the memory may get bound to.
+        """
 
     def write(self, waypoint: Waypoint) -> WriteReceipt:
         """Create a waypoint, or put it in place of the one of that name.
@@ -64,16 +120,33 @@ class MemoryStore(Protocol):
         Where the known one is of a frame that is aligned with the waypoint's, it stays in its own.
         Where that is not known, both stay, the new one with a number behind its name.
         """
+        return self._write(waypoint, lambda _, placed: placed)
 
     def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
-        """Write many waypoints, all or none.
+        """Write many waypoints, all or none; into the memory of whichever map they are of.
 
         Args:
             change: Tells which, from all that are remembered; called once or more often.
         """
 
+        def write(records: Records) -> None:
+            waypoints = tuple(change(records.read()))
+            for map_id in dict.fromkeys(each.map_id for each in waypoints):
+                records.bind(map_id)
+            records.put_places(waypoints)
+
+        self.change(write, alone=True)
+
     def write_event(self, event: Event) -> Event:
         """Write an event, in place of the one of its id; return it with its id."""
+
+        def write(records: Records) -> Event:
+            events = records.read_events()
+            placed = _event_in_its_frame(event, events.get(event.id), records.frames)
+            records.bind(None if event.frame else self.map_id)
+            return records.put(placed if placed.id else replace(placed, id=_free_id(events)))
+
+        return self.change(write, alone=True)
 
     def remember(
         self, waypoint: Waypoint, *, gone: Iterable[str] = ()
@@ -85,9 +158,15 @@ class MemoryStore(Protocol):
         Args:
             gone: Labels of landmarks that are not there any more.
         """
+        labels = tuple(gone)
+        merges: list[Merge] = []
 
-    def remove(self, name: str) -> Waypoint | None:
-        """Forget a waypoint; return it, or None where none has that name. `write` undoes it."""
+        def join(before: Waypoint | None, placed: Waypoint) -> Waypoint:
+            merges.append(merge_waypoint(before, placed, gone=labels))
+            return merges[-1].waypoint
+
+        receipt = self._write(waypoint, join)
+        return receipt, merges[-1]
 
     def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
         """Write what is known of frames, all or nothing; no record changes.
@@ -95,3 +174,74 @@ class MemoryStore(Protocol):
         Args:
             change: Tells how they read, from how they do; called once or more often.
         """
+
+        def write(records: Records) -> Frames:
+            known = records.frames.by_id
+            for frame in change(records.frames).items:
+                if known.get(frame.id) != frame:
+                    records.put(frame)
+            return records.frames
+
+        return self.change(write, alone=True)
+
+    def _write(
+        self, waypoint: Waypoint, join: Callable[[Waypoint | None, Waypoint], Waypoint]
+    ) -> WriteReceipt:
+        _require_same_map(waypoint, self.map_id)
+        map_id = None if waypoint.frame else self.map_id or waypoint.map_id
+
+        def write(records: Records) -> WriteReceipt:
+            records.bind(map_id)
+            placed = _in_its_frame(waypoint, records)
+            previous = records.find_place(name_key(placed.name))
+            written = records.put(join(previous, placed))
+            return WriteReceipt(waypoint=written, previous=previous)
+
+        return self.change(write, binding=map_id)
+
+
+def _in_its_frame(waypoint: Waypoint, records: Records) -> Waypoint:
+    """Return a waypoint as a memory keeps it: in the frame and under the name of its record.
+
+    A record of its name in a frame of which it is not known how it lies is another place: the
+    waypoint gets a number behind its name.
+    """
+    for number in count(1):
+        name = waypoint.name if number == 1 else f"{waypoint.name} ({number})"
+        known = records.find_place(name_key(name))
+        if known is None:
+            return replace(waypoint, name=name)
+        motion = records.frames.find_transform(of=waypoint.frame, into=known.frame)
+        if motion is not None:
+            is_moved = known.frame != waypoint.frame
+            placed = waypoint.moved(motion) if is_moved else waypoint
+            return replace(placed, name=name, frame=known.frame, room_id=waypoint.room_id)
+    raise AssertionError  # Numbers do not end.
+
+
+def _event_in_its_frame(event: Event, known: Event | None, frames: Frames) -> Event:
+    """Return an event as a memory keeps it: in the frame of what is known under its id."""
+    if known is None or known.frame == event.frame:
+        return event
+    motion = frames.find_transform(of=event.frame, into=known.frame)
+    if motion is None:
+        raise SemanticMapError(
+            f"The event {event.id} is of another map.", hint="Note another one for this map."
+        )
+    return replace(event.moved(motion), frame=known.frame)
+
+
+def _free_id(known_ids: Iterable[str]) -> str:
+    """Return an id that no event has had: E1, E2, ..."""
+    numbers = [int(each[1:]) for each in known_ids if each[:1] == "E" and each[1:].isdigit()]
+    return f"E{max(numbers, default=0) + 1}"
+
+
+def _require_same_map(waypoint: Waypoint, map_id: str | None) -> None:
+    """Refuse a waypoint that is of another map than the robot."""
+    if None not in (waypoint.map_id, map_id) and waypoint.map_id != map_id:
+        raise SemanticMapError(
+            f"The waypoint {quote_name(waypoint.name)} belongs to the map "
+            f"{quote_name(waypoint.map_id or '')}, but the robot is on {quote_name(map_id or '')}.",
+            hint="Write it where the robot is on that map.",
+        )

@@ -14,8 +14,8 @@ from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile, Fingerprint
+from mapspeak.memory.store.memorystore import MemoryStore, OneRecord, Records, Result
 from mapspeak.memory.store.records import key_of, list_key_of
-from mapspeak.memory.store.writing import OneRecord, Records, RecordStore, Result
 from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
@@ -34,7 +34,7 @@ class _Seen:
     fault: SemanticMapError | None
 
 
-class SemanticMapStore(RecordStore):
+class SemanticMapStore(MemoryStore):
     """The semantic map in one YAML file.
 
     Args:
@@ -69,11 +69,7 @@ class SemanticMapStore(RecordStore):
         """Return what the file says under a key of its own."""
         return self._document(self._look()).find_entry(key)
 
-    def write_entry(self, key: str, value: str) -> None:
-        """Write what the file says under a key of its own."""
-        self._rewrite(lambda records: records.write_entry(key, value))
-
-    def _change(
+    def change(
         self,
         change: Callable[[Records], Result],
         *,
@@ -81,9 +77,6 @@ class SemanticMapStore(RecordStore):
         binding: str | None = None,  # noqa: ARG002 - likewise
     ) -> Result:
         """Replace the file by a changed one, whoever else writes meanwhile."""
-        return self._rewrite(change)
-
-    def _rewrite(self, change: "Callable[[_FileRecords], Result]") -> Result:
         self._look()  # Others do not wait while this reads what it never read before.
         with self._file.locked():
             for _ in range(_N_TRIES):
@@ -173,14 +166,6 @@ class _FileRecords:
         """Write many places."""
         for waypoint in waypoints:
             self.put(waypoint)
-
-    def remove(self, key: str) -> None:
-        """Forget the place with a `name_key`."""
-        self.document = self.document.without_place(key)
-
-    def write_entry(self, key: str, value: str) -> None:
-        """Write what the file says under a key of its own."""
-        self.document = self.document.with_entry(key, value)
 
 
 def _raised_again(fault: SemanticMapError | None) -> SemanticMapError:

@@ -1,0 +1,1 @@
+"""`mapspeak memory`: the memory of places without a robot."""

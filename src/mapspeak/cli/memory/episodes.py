@@ -1,0 +1,164 @@
+"""`mapspeak memory episodes`: what was observed, when, from where."""
+
+import json
+import re
+from datetime import datetime, timedelta
+from typing import Any
+
+import click
+
+from mapspeak.cli.memory.which import JSON_OPTION, MEMORY_OPTION, open_memory
+from mapspeak.cli.options import wall_clock
+from mapspeak.geometry import Point
+from mapspeak.memory.episodes.observation import (
+    EpisodeMatch,
+    EpisodeOrder,
+    EpisodeQuery,
+    ObservationKind,
+    Rank,
+)
+from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
+from mapspeak.memory.episodes.textindex import VectorRank
+from mapspeak.memory.search.meaningindex import find_model
+from mapspeak.server.text.memory import say_reasons
+
+_AGE = re.compile(r"(\d+(?:\.\d+)?)(m|h|d)")
+_CLOCK = re.compile(r"(\d{1,2}):(\d\d)")
+_UNITS = {"m": "minutes", "h": "hours", "d": "days"}
+
+
+def read_time(text: str) -> datetime:
+    """Return a moment, in the zone of this machine where none is said."""
+    try:
+        if age := _AGE.fullmatch(text):
+            return wall_clock() - timedelta(**{_UNITS[age[2]]: float(age[1])})
+        if clock := _CLOCK.fullmatch(text):
+            hour, minute = int(clock[1]), int(clock[2])
+            return wall_clock().replace(hour=hour, minute=minute, second=0, microsecond=0)
+        time = datetime.fromisoformat(text)
+    except (ValueError, OverflowError) as error:
+        said = f"{text!r} is no time: write 2026-11-20, 2026-11-20T09:30, 09:30 or 2h."
+        raise click.BadParameter(said) from error
+    return time if time.tzinfo else time.astimezone()
+
+
+def read_place(text: str) -> tuple[float, ...]:
+    """Return x and y in metres of the map frame, and the radius in metres where it is said."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (2, 3):
+        said = f"{text!r} is no place: write x,y or x,y,radius in metres, as 4.2,-1,3."
+        raise click.BadParameter(said)
+    return numbers
+
+
+@click.command()
+@click.option("--words", help="What it is about.")
+@click.option(
+    "--near", type=read_place, metavar="X,Y[,RADIUS]", help="Around a place of the map, in metres."
+)
+@click.option(
+    "--near-words",
+    help="Around where this was seen, and without it; in the same span of time.",
+)
+@click.option("--room", help="Made in this room or corridor.")
+@click.option(
+    "--since", type=read_time, metavar="TIME", help="A date, a time, or an age such as 90m, 2h, 3d."
+)
+@click.option("--until", type=read_time, metavar="TIME", help="Likewise.")
+@click.option("--label", help="A thing seen.")
+@click.option("--kind", type=click.Choice([str(each) for each in ObservationKind]))
+@click.option(
+    "--order",
+    type=click.Choice([str(each) for each in EpisodeOrder]),
+    help="Follows from the rest if left away.",
+)
+@click.option("--limit", type=click.IntRange(1, 1000), default=20, show_default=True)
+@click.option("--offset", type=click.IntRange(min=0), default=0, show_default=True)
+@MEMORY_OPTION
+@JSON_OPTION
+def episodes(semantic_map: str | None, as_json: bool, **asked: Any) -> None:  # noqa: ANN401, FBT001 - click's options
+    """List observations that pass every filter, each with the reason why."""
+    store = EpisodeStore(memory_folder(open_memory(semantic_map).path))
+    query = _query(**asked)
+    page = store.find(query, rank=_rank(store) if asked["words"] or asked["near_words"] else None)
+    if as_json:
+        rows = [_facts(match, store) for match in page.matches]
+        found = {"n_matches": page.n_matches, "matches": rows}
+        click.echo(json.dumps(found, ensure_ascii=False, indent=2))
+        return
+    if page.anchor is not None:
+        click.echo(f"Near to: {_line(page.anchor)}")
+    for match in page.matches:
+        click.echo(_line(match))
+    more = "" if page.next_page is None else f"; more with --offset {page.next_page.offset}"
+    click.echo(f"{len(page.matches)} of {page.n_matches} observations{more}.")
+
+
+def _query(
+    *,
+    near: tuple[float, ...] | None,
+    near_words: str | None,
+    room: str | None,
+    kind: str | None,
+    order: str | None,
+    **same: Any,  # noqa: ANN401 - what a query calls as the command line does
+) -> EpisodeQuery:
+    if near is not None and near_words is not None:
+        raise click.UsageError("Give --near or --near-words, not both.")
+    place: Point | EpisodeQuery | None = None if near is None else Point(near[0], near[1])
+    if near_words is not None:
+        place = EpisodeQuery(words=near_words, since=same["since"], until=same["until"])
+    return EpisodeQuery(
+        near=place,
+        radius_m=near[2] if near is not None and len(near) == 3 else None,
+        room_id=room,
+        kind=None if kind is None else ObservationKind(kind),
+        order=None if order is None else EpisodeOrder(order),
+        **same,
+    )
+
+
+def _rank(store: EpisodeStore) -> Rank | None:
+    """Compare meanings where a model is installed; else words are compared."""
+    model = find_model()
+    return None if model is None else VectorRank(store.database, model)
+
+
+def _line(match: EpisodeMatch) -> str:
+    seen, reasons = match.observation, "; ".join(say_reasons(match))
+    said = seen.text.replace("\n", " ") or ", ".join(seen.labels)
+    parts = (
+        f"{seen.recorded_at:%Y-%m-%d %H:%M:%S}",
+        f"({seen.pose.x:.2f}, {seen.pose.y:.2f})",
+        seen.room_id or "",
+        str(seen.kind),
+        said,
+        seen.picture or "",
+        f"[{reasons}]" if reasons else "",
+    )
+    return "  ".join(filter(None, parts))
+
+
+def _facts(match: EpisodeMatch, store: EpisodeStore) -> dict[str, object]:
+    seen = match.observation
+    path = store.picture_path(seen)
+    return {
+        "id": seen.id,
+        "recorded_at": seen.recorded_at.isoformat(),
+        "stamp_s": seen.stamp_s,
+        "map": seen.map_id,
+        "x_m": seen.pose.x,
+        "y_m": seen.pose.y,
+        "yaw_deg": seen.pose.yaw_deg,
+        "room": seen.room_id,
+        "kind": str(seen.kind),
+        "text": seen.text,
+        "labels": list(seen.labels),
+        "picture": None if path is None else str(path),
+        "score": match.score_ratio,
+        "distance_m": match.distance_m,
+        "reasons": say_reasons(match),
+    }
