@@ -17,7 +17,7 @@ from mcp.client.stdio import StdioServerParameters, stdio_client
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.cli import cli
-from mapspeak.cli.memory.which import rename_memory
+from mapspeak.cli.memories import rename_memory
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.server.app import DEFAULT_TOOLSETS

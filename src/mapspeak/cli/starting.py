@@ -95,7 +95,7 @@ async def open_session(
         scratch: A folder for a memory that does not last.
         lease_s: Without a client for so long, a driving robot is stopped.
     """
-    from mapspeak.cli.memory.which import (  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.cli.memories import (  # noqa: PLC0415 - heavy; help must be quick
         keep_usual_memory,
         open_store,
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mapspeak.cli.memory.which import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
+from mapspeak.cli.memories import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
 from mapspeak.cli.options import FILE
 from mapspeak.installation import say_install
 from mapspeak.memory import SemanticMap

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from mapspeak.cli.memory.which import (
+from mapspeak.cli.memories import (
     JSON_OPTION,
     MEMORY_OPTION,
     find_memory,
