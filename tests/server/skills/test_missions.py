@@ -42,6 +42,13 @@ async def test_a_mission_runs_by_itself_and_tells_what_was_done(tmp_path: Path) 
     assert done == ["2 drive", "3 look:", "4 drive", "5 note:"]
 
 
+async def test_a_tree_may_be_json_as_a_text_or_as_it_is(tmp_path: Path) -> None:
+    tree = {"sequence": [{"drive": "R2"}, {"wait": 1}]}
+    async with missions(tmp_path) as caller:
+        for written in (json.dumps(tree), tree, tree["sequence"]):
+            assert "succeeded after" in await caller.ask("run_mission", tree=written)
+
+
 async def test_results_are_passed_on_by_name_and_decide(tmp_path: Path) -> None:
     scale = FakeSkill(spec("scale"), outputs={"load_kg": 12.5})
     speak = FakeSkill(

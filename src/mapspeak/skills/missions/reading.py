@@ -1,5 +1,6 @@
 """A mission's tree read from what a model or a person wrote; each mistake with its place."""
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -27,12 +28,13 @@ OPTIONS: Mapping[StepKind, frozenset[str]] = {
 FORM = "Write each step as `skill: argument`, or as one of " + ", ".join(sorted(CONTROL)) + "."
 
 
-def parse_tree(text: str) -> Any:  # noqa: ANN401 - whatever was written
-    """Return what a text says, as YAML or JSON.
+def parse_tree(written: object) -> Any:  # noqa: ANN401 - whatever was written
+    """Return what a text says, as YAML or JSON; what was read from JSON before is as good.
 
     Raises:
         SkillError: It is neither, or too long.
     """
+    text = written if isinstance(written, str) else json.dumps(written, default=str)
     if len(text) > MOST_TEXT:
         raise SkillError(
             f"The mission has {len(text):,} characters, the limit is {MOST_TEXT:,}.",

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context, Image
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
 from mapspeak.errors import SkillError
 from mapspeak.memory.quoting import quote
@@ -33,7 +33,11 @@ from mapspeak.skills.owners.skillsfile import (
 from mapspeak.skills.runs import SkillRuns
 
 MOST_ARGUMENTS = 20
-Tree = Annotated[str, Field(description="YAML or JSON", min_length=1, max_length=30_000)]
+Tree = Annotated[
+    Any,
+    WithJsonSchema({"type": "string", "description": "YAML or JSON"}),
+]
+"""A text for its writers; the server has read one that is JSON by the time it comes here."""
 Name = Annotated[str, Field(description="small letters, digits, _", pattern=NAME)]
 SavedName = Annotated[str | None, Field(description="of a saved mission", max_length=60)]
 Values = Annotated[
@@ -78,7 +82,7 @@ class MissionTools:
     async def run_mission(
         self,
         context: Context,
-        tree: Tree | None = None,
+        tree: Tree = None,
         name: SavedName = None,
         values: Values = None,
         within_min: Minutes = USUAL_MISSION_MIN,
@@ -135,7 +139,7 @@ class MissionTools:
     async def save_mission(
         self,
         name: Name,
-        tree: Tree | None = None,
+        tree: Tree = None,
         sentence: Sentence = "",
         parameters: Parameters = None,
         within_min: Minutes = USUAL_MISSION_MIN,
