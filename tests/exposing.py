@@ -1,6 +1,6 @@
 """A robot whose services, topics and actions a test puts up, exposed as tools of a client."""
 
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.safety import Guard
 from mapspeak.server.app import MapspeakServer, build_server
 from mapspeak.session import Session
+from mapspeak.skills.owners.skillsfile import OwnersEntry
 from rosbridge_script import PATIENCE_S
 from rosserved import QUICK, Caller
 
@@ -68,13 +69,20 @@ async def watched(
     is_read_only: bool = False,
     mode: str = "auto",
     on_message: MessageHandlerFnT | None = None,
+    skills: Sequence[OwnersEntry] = (),
 ) -> AsyncGenerator[Watched]:
     """Gives a client of a server whose skills are kept."""
     memory = SemanticMapStore(folder / "semantic_map.yaml")
     session = Session(
         robot, memory, lease_s=60.0, guard=guard, ros=connection, find_model=lambda: None
     )
-    server = build_server(session, toolsets=("drive",), expose=expose, is_read_only=is_read_only)
+    server = build_server(
+        session,
+        toolsets=("drive", "missions"),
+        expose=expose,
+        is_read_only=is_read_only,
+        skills=skills,
+    )
     with anyio.fail_after(PATIENCE_S):
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(server.keep_skills)
@@ -93,6 +101,7 @@ async def exposed(
     is_read_only: bool = False,
     mode: str = "auto",
     on_message: MessageHandlerFnT | None = None,
+    skills: Sequence[OwnersEntry] = (),
 ) -> AsyncGenerator[Watched]:
     """Gives what calls the tools that a system's names are."""
     async with (
@@ -107,6 +116,7 @@ async def exposed(
             is_read_only=is_read_only,
             mode=mode,
             on_message=on_message,
+            skills=skills,
         ) as caller,
     ):
         yield caller

@@ -16,7 +16,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.comparing import Comparison
 from mapspeak.skills.owners.owned import OwnedSkill
-from mapspeak.skills.owners.skillsfile import Called, OwnersEntry, load_skills
+from mapspeak.skills.owners.skillsfile import READY_MADE, Called, OwnersEntry, load_skills
 from skillmaking import FakeSkill, spec, tell_nobody
 
 FULL = """
@@ -113,6 +113,13 @@ def test_a_mistake_in_the_tree_of_a_mission_is_named_with_its_line_in_the_file(
             tmp_path,
             "skills:\n- name: rounds\n  mission:\n  - drive: R1\n  - retry: often\n    do: look\n",
         )
+
+
+@pytest.mark.parametrize("name", READY_MADE)
+def test_what_ships_loads_and_wants_a_persons_word_for_the_pose(name: str) -> None:
+    entries = {each.spec.name: each for each in load_skills(Path(name))}
+    assert entries["set_initial_pose"].spec.approval is SkillApproval.ALWAYS
+    assert all(each.spec.description for each in entries.values())
 
 
 @pytest.mark.anyio

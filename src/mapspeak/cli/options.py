@@ -141,7 +141,8 @@ SKILL_OPTIONS = (
         "skill_files",
         type=FILE,
         multiple=True,
-        help="skills.yaml: what else the robot can do, in its owner's words; each a tool.",
+        help="skills.yaml: what else the robot can do, in its owner's words; each a tool. nav2 and "
+        "move_base name ready-made ones.",
     ),
 )
 

@@ -29,6 +29,7 @@ from mapspeak.skills.missions.reading import read_tree
 from mapspeak.skills.missions.tree import Step
 
 NAME = r"^[a-z][a-z0-9_]{0,39}$"
+READY_MADE = ("nav2", "move_base")
 ADVICE = "docs/howto/skills.md explains every key."
 USUAL_MISSION_MIN = 30.0
 MOST_MISSION_MIN = 24 * 60.0
@@ -235,11 +236,13 @@ class _SkillsFile(_Written):
 
 
 def load_skills(path: Path) -> tuple[OwnersEntry, ...]:
-    """Read skills.yaml.
+    """Read skills.yaml, or a file that ships, by its name: nav2, move_base.
 
     Raises:
         ConfigError: It cannot be read, or has a mistake; says the line and the reason.
     """
+    if str(path) in READY_MADE and not path.exists():
+        path = Path(__file__).with_name("data") / f"{path}.yaml"
     read = read_settings(path, _SkillsFile, name="skills.yaml", advice=ADVICE)
     entries = []
     for each in read.skills:

@@ -1,0 +1,110 @@
+"""skills.yaml over a ROS system of both dialects: called, bounded, judged, approved."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from exposing import NODE, exposed, tool_system
+from guarding import make_guard
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.rosbridge_server.hub import Topic
+from mapspeak.safety import Approval, Otherwise, Policy
+from mapspeak.skills.owners.skillsfile import OwnersEntry, load_skills
+
+pytestmark = pytest.mark.anyio
+both = pytest.mark.parametrize("dialect", Dialect)
+BATTERY = "sensor_msgs/BatteryState"
+WRITTEN = """
+skills:
+- name: light
+  sentence: Switches the light of the lab
+  service: /lab/light
+  arguments:
+  - {name: is_on, sets: data, kind: flag}
+  needs: {battery_above: 0.3}
+- name: light_off
+  service: /lab/light
+  fixed: {data: false}
+  succeeded_when: {field: message, is: dark}
+- name: place_robot
+  publish: /initialpose
+  arguments:
+  - {name: x, sets: pose_pose_position_x, unit: m, least: -100, most: 100}
+  approval: always
+- name: gone
+  service: /not/there
+"""
+
+
+def load(folder: Path) -> tuple[OwnersEntry, ...]:
+    path = folder / "skills.yaml"
+    path.write_text(WRITTEN)
+    return load_skills(path)
+
+
+def lab(dialect: Dialect, *, percentage: float) -> tuple[Any, list[Any], list[Any]]:
+    """Gives a system with a light, a battery and a place for its pose, and what they hear."""
+    asked: list[Any] = []
+    poses: list[Any] = []
+
+    def answer(values: dict[str, Any]) -> dict[str, Any]:
+        asked.append(values["data"])
+        return {"success": True, "message": "bright"}
+
+    battery = Topic(name="/power", type=BATTERY, publishers=(NODE,), is_latched=True)
+    pose = Topic(
+        name="/initialpose", type="geometry_msgs/PoseWithCovarianceStamped", subscribers=(NODE,)
+    )
+    pose.takers.append(lambda publication: poses.append(publication.message))
+    system = tool_system(dialect, battery, pose)
+    system.hub.publish("/power", system.interfaces.fill(BATTERY, {"percentage": percentage}))
+    system.offer_typed("/lab/light", "std_srvs/SetBool", node=NODE, answer=answer)
+    return system, asked, poses
+
+
+@both
+async def test_a_service_is_called_with_what_the_owner_allows(
+    dialect: Dialect, tmp_path: Path
+) -> None:
+    system, asked, _ = lab(dialect, percentage=0.8)
+    async with exposed(system, tmp_path, expose=(), skills=load(tmp_path)) as caller:
+        tools = await caller.tools()
+        assert set(tools["light"].input_schema["properties"]) == {"is_on", "wait_s"}
+        assert set(tools["light_off"].input_schema["properties"]) == {"wait_s"}
+        assert "succeeded" in await caller.ask("light", is_on=True)
+        lied = await caller.ask("light_off")
+        missing = await caller.refuse("gone")
+    assert asked == [True, False]
+    assert "what counts as success did not hold" in lied
+    assert "/not/there" in missing
+
+
+@both
+async def test_a_battery_topic_decides_whether_a_skill_is_begun(
+    dialect: Dialect, tmp_path: Path
+) -> None:
+    system, asked, _ = lab(dialect, percentage=0.2)
+    async with exposed(system, tmp_path, expose=(), skills=load(tmp_path)) as caller:
+        told = await caller.ask("light", is_on=True)
+        mission = await caller.ask(
+            "run_mission", tree="fallback:\n- check: {battery_above: 0.5}\n- light_off\n"
+        )
+    assert "It needs the battery above 30 %" in told
+    assert asked == [False]
+    assert "not_achieved" in mission
+
+
+async def test_a_persons_word_lets_a_skill_publish_what_is_usually_denied(tmp_path: Path) -> None:
+    system, _, poses = lab(Dialect.ROS2, percentage=1.0)
+    guard = make_guard(tmp_path, Policy(approval=Approval(otherwise=Otherwise.QUEUE)))
+    async with exposed(system, tmp_path, expose=(), skills=load(tmp_path), guard=guard) as caller:
+        asked = await caller.refuse("place_robot", x=2.5)
+        assert poses == []
+        (wish,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(wish)
+        await caller.ask("place_robot", x=2.5)
+        again = await caller.refuse("place_robot", x=3.5)
+    assert "run the skill place_robot (x=2.5)" in asked
+    assert [each["pose"]["pose"]["position"]["x"] for each in poses] == [2.5]
+    assert "A person must agree" in again
