@@ -6,7 +6,7 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.links.cdr import Codec
-from mapspeak.ros.definitions.texts import DISTROS, action_parts, known_definitions, name_parts
+from mapspeak.ros.definitions.texts import DISTROS, action_parts, find_parts, known_definitions
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import hash_type
 from mapspeak.ros.messages.fields import TYPE, Dialect, Message, bare_type
@@ -174,10 +174,7 @@ class Types:
 
     def definitions(self, type_name: str) -> dict[str, str]:
         """Return the texts of a type and of all within; see `RosConnection.fetch_definitions`."""
-        candidates = ((bare_type(type_name),), *name_parts(type_name))
-        found = next((names for names in candidates if all(map(self._book.knows, names))), ())
-        within = [name for each in found for name in self._book.within(each)]
-        return {name: self._book.texts[name] for name in dict.fromkeys((*found, *within))}
+        return self._book.texts_of(find_parts(self._book.texts, type_name))
 
     def _use(self, book: TypeBook) -> None:
         self._book, self._codec = book, Codec(book, self._codec.store)

@@ -12,7 +12,13 @@ from typing import Any
 from mapspeak.errors import LinkError
 from mapspeak.links.cdr import Codec
 from mapspeak.links.endpoints import ACTION_PART, whole_type
-from mapspeak.ros.definitions.texts import ACTION_PARTS, SERVICE_PARTS, action_parts, split_parts
+from mapspeak.ros.definitions.texts import (
+    ACTION_PARTS,
+    KINDS,
+    SERVICE_PARTS,
+    action_parts,
+    split_parts,
+)
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import NOTHING
 from mapspeak.ros.messages.fields import TYPE, bare_type
@@ -103,7 +109,6 @@ def _write_type(text: str) -> str:
     return f"{base}[{'<=' + found['most'] if found['most'] else found['length'] or ''}]"
 
 
-KINDS = ("msg", "srv", "action")
 NAMED = {"msg": "message", "srv": "service", "action": "action"}
 
 RosClass = Any  # rclpy has no types
@@ -170,9 +175,7 @@ def find_definitions(type_name: str) -> Mapping[str, str]:
             texts = dict(_texts_of(bare_type(type_name), kind))
             names = tuple(texts)
             _add_what_is_within(texts, names)
-            book = TypeBook(texts)
-            within = [each for name in names for each in book.within(name)]
-            return {each: book.texts[each] for each in dict.fromkeys(within)}
+            return TypeBook(texts).texts_of(names)
     return {}
 
 

@@ -7,7 +7,9 @@ from typing import Any
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.channel import RosbridgeTopicRequest
 from mapspeak.ros.definitions.texts import (
+    KINDS,
     find_actions_of_ros1,
+    find_parts,
     known_definitions,
     name_parts,
     split_definition,
@@ -19,7 +21,6 @@ from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import NodeLinks, RosGraph
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
-KINDS = ("msg", "srv", "action")
 
 
 class DefinitionKeeper:
@@ -41,22 +42,14 @@ class DefinitionKeeper:
         if not self._known:
             self._known = known_definitions(dialect, distro=distro)
         # What the robot did not say when it was asked, and we know ourselves, is not asked again.
-        is_answered = bare in self._not_told and self._find(self._known, bare, kinds)
-        if not self._find(self._told, bare, kinds) and not is_answered:
+        is_answered = bare in self._not_told and find_parts(self._known, bare, kinds)
+        if not find_parts(self._told, bare, kinds) and not is_answered:
             await self._ask_graph()
-            if dialect is Dialect.ROS1 and not self._find(self._told, bare, kinds):
+            if dialect is Dialect.ROS1 and not find_parts(self._told, bare, kinds):
                 await self._ask_details(bare, kinds)
             self._not_told.add(bare)
-        names = self._find(self._told, bare, kinds) or self._find(self._known, bare, kinds)
-        book = TypeBook({**self._known, **self._told})
-        within = [each for name in names for each in book.within(name)]
-        return {each: book.texts[each] for each in dict.fromkeys(within)}
-
-    def _find(self, texts: Mapping[str, str], bare: str, kinds: tuple[str, ...]) -> tuple[str, ...]:
-        service, action = name_parts(bare)
-        options = {"msg": (bare,), "srv": service, "action": action}
-        found = (options[kind] for kind in kinds)
-        return next((names for names in found if all(name in texts for name in names)), ())
+        names = find_parts(self._told, bare, kinds) or find_parts(self._known, bare, kinds)
+        return TypeBook({**self._known, **self._told}).texts_of(names)
 
     async def _ask_graph(self) -> None:
         """Take the definitions of all types that some topic has."""

@@ -5,7 +5,7 @@ actions, and Nav2's interfaces, which differ from distribution to distribution.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 
@@ -14,6 +14,7 @@ from mapspeak.ros.messages.fields import Dialect, bare_type
 RULER_LINE = "=" * 80
 RULER = re.compile(r"^=+\nMSG: (?P<name>\S+)\n?", re.MULTILINE)
 DIVIDER = re.compile(r"^---[ \t]*$\n?", re.MULTILINE)
+KINDS = ("msg", "srv", "action")
 SERVICE_PARTS = ("Request", "Response")
 ACTION_PARTS = ("Goal", "Result", "Feedback")
 GENERATED = re.compile(r"_(Request|Response|Goal|Result|FeedbackMessage|Feedback)$")
@@ -46,6 +47,22 @@ def name_parts(type_name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         tuple(f"{bare}_{part}" for part in SERVICE_PARTS),
         tuple(f"{bare}_{part}" for part in ACTION_PARTS),
     )
+
+
+def find_parts(
+    texts: Container[str], type_name: str, kinds: Iterable[str] = KINDS
+) -> tuple[str, ...]:
+    """Return the names under which a type is among some texts: its own, or those of its parts.
+
+    Args:
+        texts: By name as "package/Type", as `RosConnection.fetch_definitions` gives them.
+        type_name: Of a message, a service or an action.
+        kinds: What it may be, the likeliest first.
+    """
+    service, action = name_parts(type_name)
+    options = {"msg": (bare_type(type_name),), "srv": service, "action": action}
+    found = (options[kind] for kind in kinds)
+    return next((names for names in found if all(name in texts for name in names)), ())
 
 
 def split_parts(type_name: str, text: str) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """Message types as values, read from their .msg texts, and books of types that know each other."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +20,8 @@ WHOLES = {
 }  # fmt: skip
 """The kinds of whole numbers, each with the least and the largest."""
 TEXTS = ("string", "wstring")
-TIMES = ("time", "duration")
-"""What ROS 1 has no message for: seconds and nanoseconds."""
+TIMES = {"time": "uint32 secs\nuint32 nsecs", "duration": "int32 secs\nint32 nsecs"}
+"""What ROS 1 has no message for, as the text that one would have."""
 PLAIN = frozenset((*FLOATS, *WHOLES, *TEXTS, *TIMES, "bool"))
 
 
@@ -132,10 +132,6 @@ def _full_type(name: str, package: str) -> str:
     return HEADER if name == "Header" else f"{package}/{name}"
 
 
-TIME_OF_ROS1 = {
-    "time": "uint32 secs\nuint32 nsecs",
-    "duration": "int32 secs\nint32 nsecs",
-}
 MOST_NESTED = 32
 """No message is nested deeper; one that is holds itself, by a definition that is wrong."""
 
@@ -155,7 +151,7 @@ class TypeBook:
         """Return a type that is known; the times of ROS 1 are types of two numbers."""
         bare = name if name in TIMES else bare_type(name)
         if bare not in self._types:
-            text = TIME_OF_ROS1[bare] if bare in TIMES else self.texts[bare]
+            text = TIMES[bare] if bare in TIMES else self.texts[bare]
             self._types[bare] = parse_definition(bare, text)
         return self._types[bare]
 
@@ -166,6 +162,12 @@ class TypeBook:
             inner = [field.type for field in self[each].fields if field.type in self.texts]
             found += [kind for kind in dict.fromkeys(inner) if kind not in found]
         return found
+
+    def texts_of(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the texts of some types, and of all types within that are known."""
+        listed = list(names)
+        within = [each for name in listed for each in self.within(name)]
+        return {each: self.texts[each] for each in dict.fromkeys((*listed, *within))}
 
     def missing(self, name: str) -> list[str]:
         """Return the types within a known one that nobody has described."""

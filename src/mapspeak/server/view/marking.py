@@ -28,7 +28,7 @@ Colour = tuple[float, float, float, float]
 COLOURS: dict[str, Colour] = {
     "room": (0.1, 0.4, 0.9, 1.0),
     "corridor": (0.4, 0.4, 0.45, 1.0),
-    "doors": (0.6, 0.35, 0.1, 0.9),
+    "doors": (0.6, 0.35, 0.1, 0.5),
     "frontiers": (0.1, 0.65, 0.3, 1.0),
     "closed": (0.85, 0.1, 0.1, 1.0),
     "places": (0.5, 0.2, 0.7, 1.0),

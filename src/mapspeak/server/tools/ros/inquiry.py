@@ -1,6 +1,6 @@
 """Asking a ROS system what it is made of: names checked, types described, the latest graph kept."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import anyio
@@ -8,7 +8,12 @@ import anyio
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.installation import shell_command
 from mapspeak.ros.definitions.checking import describe_type
-from mapspeak.ros.definitions.texts import kinds_of, known_definitions, name_parts, split_parts
+from mapspeak.ros.definitions.texts import (
+    find_parts,
+    kinds_of,
+    known_definitions,
+    split_parts,
+)
 from mapspeak.ros.definitions.types import TypeBook, find_odd_lines, parse_definition
 from mapspeak.ros.messages.fields import NAME, TYPE, Dialect, bare_type
 from mapspeak.ros.port import RosConnection, RosGraph, find_nearest
@@ -198,7 +203,7 @@ class RosInquiry:
         if not texts:
             # Nobody but whoever taught us knows it.
             texts = self._taught
-        parts = _find_parts(texts, bare)
+        parts = find_parts(texts, bare)
         if not parts:
             raise await self._unknown_type(type_name)
         return Described(type=bare, parts=parts, book=TypeBook({**self._taught, **texts}))
@@ -339,14 +344,6 @@ def actions_of(graph: RosGraph) -> tuple[str, ...]:
         return graph.actions
     goals = (name for name, kind in graph.types.items() if kind.endswith(ACTION_GOAL))
     return tuple(sorted(name.removesuffix("/goal") for name in goals if name.endswith("/goal")))
-
-
-def _find_parts(texts: Mapping[str, str], bare: str) -> tuple[str, ...]:
-    service, action = name_parts(bare)
-    for names in ((bare,), service, action):
-        if all(name in texts for name in names):
-            return names
-    return ()
 
 
 def require_ros(session: Session, *, toolsets: Iterable[str], tools: Iterable[str] = ()) -> None:
