@@ -273,18 +273,18 @@ class Session:
             await self.compute(partial(self._meet, grid))
 
     async def find_goal(
-        self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
+        self,
+        *,
+        place: str | None = None,
+        x: float | None = None,
+        y: float | None = None,
+        yaw_deg: float | None = None,
+        as_near: bool = False,
     ) -> CheckedGoal:
-        """Return the pose to drive to for a place or for coordinates, checked against the map.
-
-        Raises:
-            GoalError: Neither or both were given, or the robot cannot drive there; the hint names
-                the nearest pose that would work.
-        """
+        """Return the pose to drive to, or raise GoalError, as `choose_goal` does."""
         world = await self.fetch_world_model()
-        return await self.compute(
-            lambda: choose_goal(world, place=place, x=x, y=y, yaw_deg=yaw_deg)
-        )
+        choose = partial(choose_goal, place=place, x=x, y=y, yaw_deg=yaw_deg, as_near=as_near)
+        return await self.compute(partial(choose, world))
 
     async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision | None, tuple[str, ...]]:
         """Return the map with what is closed on it now, and what is to be said of that."""

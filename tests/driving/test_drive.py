@@ -222,3 +222,13 @@ async def test_a_drive_from_before_the_clock_was_set_back_has_no_negative_time()
     report = await drives.report(drive.goal_id)
     assert report.elapsed_s == 0.0
     assert report.pose_age_s == 0.0
+
+
+async def test_the_time_of_a_drive_ends_with_it() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    drive = await start(drives, FAR)
+    ended = await drives.cancel(drive.goal_id)
+    await robot.sleep(60.0)
+    later = await drives.report(drive.goal_id)
+    assert later.elapsed_s == ended.elapsed_s

@@ -14,6 +14,7 @@ from mcp.client import Client
 from mcp_types import CallToolResult, ImageContent
 from PIL import Image
 
+from goldens.statements import Statements
 from guarding import audit_of, make_guard
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Robot
@@ -35,12 +36,16 @@ class Transcript:
 
     Args:
         client: Connected to the server.
+        statements: Check what is answered; None to believe it.
         is_paced: Time passes by the wall clock: durations are left out of what is kept.
     """
 
-    def __init__(self, client: Client, *, is_paced: bool = False) -> None:
+    def __init__(
+        self, client: Client, statements: Statements | None = None, *, is_paced: bool = False
+    ) -> None:
         self.entries: list[str] = []
         self._client = client
+        self._statements = statements
         self._is_paced = is_paced
 
     async def call(self, tool: str, /, **arguments: Any) -> str:  # noqa: ANN401
@@ -51,6 +56,9 @@ class Transcript:
         body = [said + text_of(result), *_structure(result), *map(_digest, pictures_of(result))]
         entry = "\n".join([head, *(part for part in body if part)])
         self.entries.append(SECONDS.sub("#", entry) if self._is_paced else entry)
+        if self._statements is not None:
+            number = len(self.entries)
+            self._statements.check(number, tool, said + text_of(result), result.structured_content)
         return text_of(result)
 
     def note(self, title: str, lines: list[str]) -> None:
@@ -81,8 +89,11 @@ async def playing(
     session = Session(robot, memory, lease_s=60.0, guard=guard, ros=ros, find_model=lambda: None)
     server = build_server(session, toolsets=toolsets)
     async with Client(server) as client:
-        transcript = Transcript(client, is_paced=is_paced)
+        statements = None if is_paced else Statements(session)
+        transcript = Transcript(client, statements, is_paced=is_paced)
         yield transcript
+    if statements is not None:
+        transcript.note("statements", statements.say())
     lines = [
         " ".join(_compact(getattr(line, name, "")) for name in ("event", "tool", "verdict", "said"))
         for line in audit_of(folder)

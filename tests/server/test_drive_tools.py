@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import anyio
@@ -173,7 +174,7 @@ async def test_an_argument_that_does_not_exist_is_not_dropped_without_a_word(
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         result = await client.call_tool("navigate_to", {"place": "R2", "yaw": 90})
     assert result.is_error
-    assert "no argument yaw; it has: place, wait_s, x, y, yaw_deg" in text_of(result)
+    assert "no argument yaw; it has: as_near, place, wait_s, x, y, yaw_deg" in text_of(result)
 
 
 async def test_a_goal_id_that_nobody_gave_is_an_error(tmp_path: Path) -> None:
@@ -244,6 +245,21 @@ async def test_a_robot_that_was_moved_after_it_arrived_does_not_stand_at_the_goa
         later = report_of(await client.call_tool("wait_for_goal", {}))
     assert later["distance_left_m"] == 0.8
     assert "0.80 m from the goal now" in later["next_step"]
+
+
+async def test_a_goal_in_a_wall_is_taken_as_near_as_possible_where_that_is_asked_for(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        refused = await client.call_tool("navigate_to", {"x": 0.0, "y": 0.0})
+        near = report_of(
+            await client.call_tool("navigate_to", {"x": 0.0, "y": 0.0, "as_near": True})
+        )
+    assert refused.is_error
+    assert near["state"] == "arrived"
+    assert near["place"] == "as near to (0.00, 0.00) as possible"
+    assert math.hypot(near["robot"]["x"], near["robot"]["y"]) < 1.0
 
 
 async def test_a_wait_that_is_too_long_is_shortened(tmp_path: Path) -> None:

@@ -230,3 +230,11 @@ def test_a_path_is_sampled_at_its_corners_and_in_even_steps_between_them() -> No
     path = Path.through((Point(0.0, 0.0), Point(1.0, 0.0), Point(1.0, 0.3)))
     sampled = path.sampled(0.5)
     assert [(point.x, point.y) for point in sampled] == [(0, 0), (0.5, 0), (1, 0), (1, 0.3)]
+
+
+def test_a_way_within_one_cell_is_straight() -> None:
+    grid = OccupancyGrid(cells=np.zeros((40, 40), np.int8), resolution_m=0.05)
+    start, goal = Point(1.01, 1.01), Point(1.02, 1.01)
+    way = distances_from(grid, start, radius_m=0.2).path_to(goal)
+    assert way is not None
+    assert way.length_m == pytest.approx(0.01)

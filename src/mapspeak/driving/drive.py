@@ -386,7 +386,8 @@ class DriveBook:
 
     def _end(self, drive: Drive, status: GoalStatus) -> None:
         """Note how a drive ended; the first word counts."""
-        self._keep(replace(drive, final=drive.final or status))
+        if drive.final is None:
+            self._keep(replace(drive, final=status, ended_s=self._robot.now_s))
 
     def _keep(self, drive: Drive) -> Drive:
         self._n_started += drive.goal_id not in self._drives

@@ -185,6 +185,7 @@ class DriveMonitor:
             # Once it has ended as then, with what became of it since.
             status = replace(drive.final, afterwards=status.afterwards)
         unseen_s = 0.0 if look.error is None else self._wall_s() - self._seen_s
+        until_s = now_s if drive.ended_s is None else drive.ended_s
         return DriveReport(
             drive=drive,
             status=status,
@@ -194,7 +195,7 @@ class DriveMonitor:
             silence="" if look.error is None else look.error.message,
             is_stop_owed=is_stop_owed,
             # A simulation that is begun anew sets its clock back.
-            elapsed_s=max(now_s - drive.started_s, 0.0),
+            elapsed_s=max(until_s - drive.started_s, 0.0),
         )
 
 

@@ -28,8 +28,8 @@ class Drive:
         ticket: What it was started with; a stop since then ends also what was to follow it.
         purpose: What the robot comes for.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
-        ended_at: Where the robot was when it was heard that the drive had ended; None where that
-            is not known.
+        ended_s: Robot time when it was heard that the drive had ended; None while it goes on.
+        ended_at: Where the robot was then; None where that is not known.
         heard: How it stood when the robot was heard last.
     """
 
@@ -42,6 +42,7 @@ class Drive:
     ticket: int = 0
     purpose: GoalPurpose = GoalPurpose.ARRIVE
     begun_at: Point | None = None
+    ended_s: float | None = None
     ended_at: Point | None = None
     heard: GoalStatus = JUST_SENT
     final: GoalStatus | None = None

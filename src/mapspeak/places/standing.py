@@ -119,16 +119,15 @@ def arrival_pose(world: WorldModel, point: Point) -> Pose:
     """Return the pose at a point in which the robot ends when it drives there straight on.
 
     It is the direction of the last stretch of the way, as long as the robot: a way over cells may
-    end with a step aside, and the robot should not turn for that.
+    end with a step aside, and the robot should not turn for that, nor for a way shorter than its
+    radius.
     """
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
     path = world.map.find_path_over(world.distances, point) if is_near else None
-    if path is None:
+    if path is None or path.length_m < world.radius_m:
         return Pose(point.x, point.y, world.robot.yaw_rad)
     before = point_along(path.points[::-1], 2 * world.radius_m)
-    has_length = before != path.points[-1]
-    yaw_rad = before.bearing_to(point) if has_length else world.robot.yaw_rad
-    return Pose(point.x, point.y, yaw_rad)
+    return Pose(point.x, point.y, before.bearing_to(point))
 
 
 def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:

@@ -100,9 +100,18 @@ class CheckedGoal:
 
 
 def choose_goal(
-    world: WorldModel, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
+    world: WorldModel,
+    *,
+    place: str | None,
+    x: float | None,
+    y: float | None,
+    yaw_deg: float | None,
+    as_near: bool = False,
 ) -> CheckedGoal:
     """Return the pose to drive to for a place or for coordinates, checked against the map.
+
+    Args:
+        as_near: Take the nearest pose that works where the place itself does not.
 
     Raises:
         GoalError: Neither or both were given, there is no such place, or the robot cannot drive
@@ -110,6 +119,10 @@ def choose_goal(
     """
     meant = read_place(world, place=place, x=x, y=y)
     goal = check_place(world, meant, yaw_deg=yaw_deg)
+    if as_near and not goal.check.is_ok and goal.check.nearest is not None:
+        near = goal.check.nearest
+        instead = Place(f"as near to {goal.name} as possible", Spot(near.point, near.yaw_rad))
+        goal = check_place(world, instead, yaw_deg=yaw_deg)
     if not goal.check.is_ok:
         has_heading = yaw_deg is not None or _has_heading(meant)
         hint, step = _what_instead(goal.check, has_heading=has_heading)

@@ -11,7 +11,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
-from mapspeak.places.goalcheck import GoalVerdict, say_check
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
 from mapspeak.places.naming import find_elsewhere
 from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
 from mapspeak.robot import CauseCode, GoalState, StampedPose
@@ -94,7 +94,7 @@ class DriveAnswer(Report):
     pose_uncertain: str = Field(
         description="why the robot may be elsewhere; empty for a fresh pose on the map"
     )
-    distance_left_m: float | None = Field(description="by path; straight once it has arrived")
+    distance_left_m: float | None = Field(description="by path; straight once it has ended")
     elapsed_s: float
     reason: str
     next_step: str = Field(description="empty once the robot stands at the goal")
@@ -120,7 +120,7 @@ class DriveAnswer(Report):
 
 
 def _distance_left_m(report: DriveReport) -> float | None:
-    if report.status.state is not GoalState.ARRIVED:
+    if not report.status.state.is_final:
         return report.status.distance_left_m
     return report.pose.point.distance_to(report.drive.goal.point)
 
@@ -157,7 +157,9 @@ class GoalAnswer(Report):
     reason: str
     pose: PoseReport = Field(description="where the robot would stand")
     room: str | None = Field(description="the room or corridor that is in, by id")
-    clearance_m: float | None = Field(description="to the nearest obstacle; null when none known")
+    clearance_m: float | None = Field(
+        description="to the nearest obstacle; null where that is not known"
+    )
     path_m: float | None = Field(description="null when there is no way")
     nearest: PoseReport | None = Field(description="the nearest pose that works, if this does not")
 
@@ -171,10 +173,15 @@ class GoalAnswer(Report):
             reason="; ".join(filter(None, (goal.place.reason, say_check(check)))),
             pose=PoseReport.of(goal.pose),
             room=room,
-            clearance_m=round(check.clearance_m, 2) if math.isfinite(check.clearance_m) else None,
+            clearance_m=_clearance_m(check),
             path_m=None if check.path_m is None else round(check.path_m, 2),
             nearest=None if check.nearest is None else PoseReport.of(check.nearest),
         )
+
+
+def _clearance_m(check: GoalCheck) -> float | None:
+    is_seen = check.verdict not in (GoalVerdict.OFF_MAP, GoalVerdict.UNKNOWN)
+    return round(check.clearance_m, 2) if is_seen and math.isfinite(check.clearance_m) else None
 
 
 class LandmarkReport(Report):

@@ -42,7 +42,7 @@ Metres = Annotated[float | None, Field(description="metres, map frame", allow_in
 Degrees = Annotated[
     float | None,
     Field(
-        description="heading on arrival, counter-clockwise from +x; also with place",
+        description="on arrival, counter-clockwise from +x",
         allow_inf_nan=False,
     ),
 ]
@@ -72,6 +72,7 @@ NPictures = Annotated[
         strict=True,
     ),
 ]
+AsNear = Annotated[bool, Field(description="else drive to that")]
 GoalId = Annotated[str | None, Field(description="such as G1; else the latest")]
 
 
@@ -96,15 +97,19 @@ class DriveTools:
         y: Metres = None,
         yaw_deg: Degrees = None,
         wait_s: Wait = 20.0,
+        *,
+        as_near: AsNear = False,
     ) -> DriveAnswer:
         """Drive the robot to a place: an id, a remembered name, or x and y.
 
-        The goal is checked first; a refused goal comes with one that works.
+        A goal that does not work is refused with one that does.
         Answers `arrived` or, after wait_s, a goal_id. A newer goal replaces the older.
         """
         drives = self._session.drives
         with drives.preparing() as ticket:
-            goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
+            goal = await self._session.find_goal(
+                place=place, x=x, y=y, yaw_deg=yaw_deg, as_near=as_near
+            )
             goal = await aim(self._session, goal)
             with _errand_of(goal.title, goal.purpose):
                 drive = await drives.start(
@@ -146,10 +151,7 @@ class DriveTools:
 
     @tool("Stop the robot", ToolEffect.STOPS, is_entry=True)
     async def stop_robot(self) -> str:
-        """Stop the robot at once and end every drive.
-
-        Use it whenever going on could do harm; it works during any other call.
-        """
+        """Stop the robot at once and end every drive; it works during any other call."""
         ended = self._session.drives.under_way
         try:
             await self._session.drives.stop()

@@ -95,6 +95,8 @@ def find_path_near(
     Near also means near the straight legs that could replace the rough way, as its own directions
     are multiples of 45 degrees. Weights are those of the map's cells, where some cost more.
     """
+    if rough_way.size < 2:
+        return Path.through(ends)
     rough_costs = _wall_weights(lattice, radius_m)
     if weights is not None:
         rough_costs = rough_costs * lattice.coarsened(weights)
