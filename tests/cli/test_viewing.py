@@ -81,6 +81,16 @@ async def test_a_server_without_a_page_opens_one_for_whoever_asks(tmp_path: Path
     assert (free.status_code, locked.status_code) == (200, 403)
 
 
+def test_what_is_no_request_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "view" / "folder.key").mkdir(parents=True)
+    (tmp_path / "view" / "odd.key").write_bytes(b"\xff\xfe\x00")
+    desk, keys = ViewDesk(tmp_path), PageKeys(lambda _: None)
+    for found in desk.find_requests():
+        desk.answer(found, keys, robots="hall", url="http://127.0.0.1:1/")
+    assert desk.find_requests() == []
+    assert list((tmp_path / "view").glob("*.url")) == []
+
+
 def test_a_request_holds_no_key_and_is_answered_once(tmp_path: Path) -> None:
     request = ViewRequest.leave(tmp_path, "ada\nben")
     desk, keys = ViewDesk(tmp_path), PageKeys(lambda _: None)

@@ -17,6 +17,7 @@ from mapspeak.cli.drawing import MARKERS_OPTION
 from mapspeak.cli.evaluating import INTERRUPTED
 from mapspeak.cli.operating import StopKeys, Tell, stop_keys
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION, usual_modes
+from mapspeak.cli.viewing import VIEW_OPTION
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -127,8 +128,15 @@ MEMORY = "semantic_map.yaml"
     type=click.Path(path_type=Path, file_okay=False),
     help="Folder for the results (default: out/demo-WORLD-SEED).",
 )
+@VIEW_OPTION
 @click.option("--quiet", "is_quiet", is_flag=True, help="Print the result only.")
-def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  # noqa: FBT001 - a flag
+def demo(
+    world: str,
+    seed: int,
+    folder: Path | None,
+    view: str | None,
+    is_quiet: bool,  # noqa: FBT001 - a flag
+) -> None:
     """Let a script do the paper's three tasks on the simulated robot, over MCP, and score them.
 
     It is what `mapspeak eval --worlds WORLD --trials 1` does, for you to watch. In a terminal,
@@ -144,7 +152,7 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
     console = Console(soft_wrap=True, highlight=False)
     try:
         with TrialBar(is_quiet=is_quiet) as bar, usual_modes():
-            results = _run_trials(world, seed, folder, bar)
+            results = _run_trials(world, seed, folder, bar, view)
             page = write_page(folder, results)
             write_log(folder, results, {}, is_whole=True)
     except KeyboardInterrupt:
@@ -156,7 +164,9 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
     sys.exit(0 if all(result.score.is_success for result in results) else 1)
 
 
-def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
+def _run_trials(
+    world: str, seed: int, folder: Path, bar: "TrialBar", view: str | None
+) -> "list[TrialResult]":
     """Run the trials one after the other in this process, each with a server over stdio."""
     from mapspeak.evaluation.agent import ServerAccess  # noqa: PLC0415
     from mapspeak.evaluation.runs.attempt import attempt  # noqa: PLC0415
@@ -181,6 +191,7 @@ def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[T
                 job.after,
                 connection=ServerAccess.STDIO,
                 control=hold.folder,
+                view=view,
                 on_turn=_watch(bar, keys),
             )
             results.append(result)

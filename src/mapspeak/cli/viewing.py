@@ -35,6 +35,8 @@ VIEW_OPTION = click.option(
 )
 LOOK_S = 0.3
 """Wall time between two looks for somebody who asks for the page."""
+WAIT_S = 5.0
+"""Wall time until a page that could not be served is tried again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +77,15 @@ class LivePage:
                     click.echo(f"mapspeak: live page at {url}", err=True)
                     task_status.started()
 
-            where = self.address or _find_free(DEFAULT_VIEW)
-            await serve_view(self.feeds, where, keys=self.keys, on_ready=tell)
+            while self.address is None:
+                # That somebody wants to look must never end the server of a robot.
+                try:
+                    where = _find_free(DEFAULT_VIEW)
+                    await serve_view(self.feeds, where, keys=self.keys, on_ready=tell)
+                except ConfigError as error:
+                    click.echo(f"mapspeak: no live page: {error}", err=True)
+                    await anyio.sleep(WAIT_S)
+            await serve_view(self.feeds, self.address, keys=self.keys, on_ready=tell)
 
     async def _answer(self, is_wanted: anyio.Event) -> None:
         """Tell those who ask where the page is, once it is there."""

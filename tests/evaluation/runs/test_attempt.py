@@ -2,13 +2,17 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import httpx2
 import pytest
 
+from livepage import find_free_address
 from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agent import ServerAccess
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.trials import (
     Trial,
     TrialResult,
+    Turn,
     read_turns,
     trial_folder,
 )
@@ -52,6 +56,28 @@ def test_the_smallest_room_is_found_on_a_known_map(tmp_path: Path, agent: str) -
     assert result.score.is_success, result.score.reason
     assert result.n_collisions == 0
     assert result.shortest_m is not None
+
+
+def test_a_trial_can_be_watched_in_a_live_page(tmp_path: Path) -> None:
+    world, address, seen = make_flat(tmp_path), find_free_address(), list[int]()
+    preparation = prepare(tmp_path, world)
+    trial = Trial(
+        task="question-way",
+        world=str(tmp_path / "flat.yaml"),
+        seed=1,
+        agent="scripted",
+        representation="picture-table",
+        number=1,
+    )
+
+    def look(turn: Turn) -> None:
+        if turn.role == "tool":
+            seen.append(httpx2.get(f"http://{address}/").status_code)
+
+    access = ServerAccess.STDIO
+    attempt(tmp_path, trial, world, preparation, connection=access, view=address, on_turn=look)
+    assert seen
+    assert set(seen) == {200}
 
 
 def test_a_question_is_answered_without_driving(tmp_path: Path) -> None:

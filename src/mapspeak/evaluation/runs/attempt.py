@@ -123,6 +123,7 @@ def attempt(
     *,
     connection: ServerAccess | None = None,
     control: Path | None = None,
+    view: str | None = None,
     on_turn: Callable[[Turn], None] | None = None,
 ) -> TrialResult:
     """Carry out a trial, write everything about it, its result last, and return that.
@@ -131,13 +132,14 @@ def attempt(
         preparation: The trial whose map and memory this one starts from; None where there is none.
         connection: How the agent reaches the server; None for the way that the agent prefers.
         control: Where the robot is held and released; None for a folder of the trial.
+        view: Address of a live page of a server that runs as a program; None for no page.
         on_turn: Told of each piece of the conversation, a call before it is made.
     """
     begun_cpu_s = time.process_time()
     # Trials share the machine: one thread each costs least.
     cv2.setNumThreads(1)
     site, task = GroundTruth(world), find_task(trial.task)
-    setup = _prepare(run, trial, site, preparation, control)
+    setup = replace(_prepare(run, trial, site, preparation, control), view=view)
     setting = setup.setting
     as_set = _as_set(site, setting)
     agent = find_agent(trial.agent, trial.thinking, (setting, as_set))

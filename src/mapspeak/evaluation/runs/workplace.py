@@ -47,6 +47,7 @@ class TrialSetup:
         known_map: A finished map (.yaml) for the robot; None where it has none.
         folder: The trial's.
         control: Where the robot is held and released.
+        view: Address of a live page, where the server runs as a program; None for no page.
     """
 
     trial: Trial
@@ -55,6 +56,7 @@ class TrialSetup:
     known_map: Path | None
     folder: Path
     control: Path
+    view: str | None = None
 
     @property
     def toolsets(self) -> tuple[str, ...]:
@@ -93,6 +95,7 @@ class TrialSetup:
             *known,
             *tools,
             *("--representation", self.trial.representation),
+            *(() if self.view is None else ("--view", self.view)),
             *("--state-log", str(self.folder / STATES)),
             *("--final-map", str(self.folder / MAP)),
             *_usual_options(self.toolsets, self.folder, self.control),

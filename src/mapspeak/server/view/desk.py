@@ -29,13 +29,16 @@ class ViewDesk:
 
     def find_requests(self) -> list[Path]:
         """Return the requests that were not answered yet."""
-        found = (self.control / FOLDER).glob(f"*{REQUEST}")
-        return [path for path in found if path.name not in self._taken]
+        with suppress(OSError):
+            found = (self.control / FOLDER).glob(f"*{REQUEST}")
+            return [path for path in found if path.name not in self._taken]
+        return []
 
     def answer(self, request: Path, keys: PageKeys, *, robots: str, url: str) -> None:
         """Take the key of a request, and tell where the page is."""
         self._taken.add(request.name)
-        with suppress(OSError):
+        # Anything may lie there: what is no request is left alone.
+        with suppress(OSError, ValueError):
             key_digest, _, name = request.read_text("utf-8").partition("\n")
             keys.admit(key_digest.strip(), name)
             told = request.with_name(f"{request.stem}-{os.getpid()}{ANSWER}")
