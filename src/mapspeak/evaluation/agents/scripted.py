@@ -20,6 +20,7 @@ from mapspeak.evaluation.agents.driver import (
     ToolDriver,
     find_label,
 )
+from mapspeak.evaluation.agents.errands import do_errand
 from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.trials import TrialState
 from mapspeak.geometry import Point, wrap_angle
@@ -299,6 +300,7 @@ BESIDE_POSE = (
 )
 DEEDS: tuple[tuple[str, Deed], ...] = (
     (r"^Inspect the robot's ROS\.", lambda driver, match: diagnose(driver.tools, match.string)),
+    (r"^Errand, ", lambda driver, match: do_errand(driver, match.string)),
     (r"Answer without driving\.", lambda driver, match: _answer_question(driver, match.string)),
     (r"^Update the map", _explore),
     (rf"around \((?P<x>{NUMBER}), (?P<y>{NUMBER})\) by its sketch", _go_by_note),

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import anyio
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 from mcp.server.mcpserver import MCPServer
@@ -164,8 +165,11 @@ async def _open_in_memory(setup: TrialSetup) -> AsyncGenerator[Workplace]:
         representation=Representation(setup.trial.representation),
     )
     try:
-        async with _connect(server, lambda: StateRecord.of(simulation)) as place:
-            yield place
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(server.keep_skills)
+            async with _connect(server, lambda: StateRecord.of(simulation)) as place:
+                yield place
+            tasks.cancel_scope.cancel()
     finally:
         log.close()
         write_map(simulation.map(), setup.folder / MAP, mode=MapMode.RAW)

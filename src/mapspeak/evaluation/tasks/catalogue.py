@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.scores.judging import judge_coverage
+from mapspeak.evaluation.tasks.errands import ERRAND_TASKS
 from mapspeak.evaluation.tasks.failures import FAILURE_TASKS
 from mapspeak.evaluation.tasks.inspections import INSPECTION_TASKS
 from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
@@ -50,6 +51,7 @@ _ALL = (
     ROUTE_TASK,
     *QUESTION_TASKS,
     *FAILURE_TASKS,
+    *ERRAND_TASKS,
     *INSPECTION_TASKS,
 )
 _TASKS: Mapping[str, Task] = MappingProxyType({task.name: task for task in _ALL})
@@ -64,6 +66,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "search": ("search",),
         "questions": tuple(task.name for task in QUESTION_TASKS),
         "failures": tuple(task.name for task in FAILURE_TASKS),
+        "errands": tuple(task.name for task in ERRAND_TASKS),
         "inspection": tuple(task.name for task in INSPECTION_TASKS),
         "all": tuple(_TASKS),
     }

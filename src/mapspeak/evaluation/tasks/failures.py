@@ -42,7 +42,7 @@ ROOM_LEFT_RATIO = 0.5
 def _draw_blocked_way(draw: Draw) -> Setting:
     """Draw a door that the map shows and crates block: there is another way, or none."""
     site = draw.site
-    for door, room in draw.shuffled(_find_doors_into_rooms(site)):
+    for door, room in draw.shuffled(find_doors_into_rooms(site)):
         crates = _close_door(door)
         blocked = site.with_more(crates)
         goal = site.cells_of(room)
@@ -115,7 +115,7 @@ def _untouched(evidence: Evidence, score: Score) -> Score:
     return replace(score, is_success=False, failure=Failure.COLLIDED, reason=reason)
 
 
-def _find_doors_into_rooms(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRoom]]:
+def find_doors_into_rooms(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRoom]]:
     """Return doors with the smaller of the two spaces that they lead into."""
     found = []
     map_from_world = site.world.start.inverse()
@@ -256,7 +256,7 @@ FAILURE_TASKS = (
         name="blocked-way",
         draw=_draw_blocked_way,
         judge=_judge_blocked_way,
-        is_offered=lambda site: bool(_find_doors_into_rooms(site)),
+        is_offered=lambda site: bool(find_doors_into_rooms(site)),
     ),
     Task(
         name="stale-map",

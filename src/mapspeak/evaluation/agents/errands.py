@@ -1,0 +1,63 @@
+"""How the scripted policy does a composed errand: it reads it into a mission, and has that run."""
+
+import json
+import re
+from typing import Any
+
+from mapspeak.evaluation.agent import AgentEnd, gave_up
+from mapspeak.evaluation.agents.driver import ToolDriver
+from mapspeak.geometry import Point
+
+PLACE = re.compile(
+    r"[Gg]o to the (?:space around \((?P<x>-?[\d.]+), (?P<y>-?[\d.]+)\)|nearest (?P<label>[^.]+?)) "
+    r'and say "(?P<words>[^"]+)" there'
+)
+LOW = re.compile(r"battery is below (\d+) %.+ to (\d+) % before", re.DOTALL)
+STATE = re.compile(r"\): (\w+) after")
+WITHIN_MIN = 50.0
+MOST_WAITS = 150
+SPEAK_TRIES = 3
+DOCK = "nearest charging dock"
+
+
+async def do_errand(driver: ToolDriver, errand: str) -> AgentEnd:
+    """Run an errand as one mission, and say how that ended."""
+    steps: list[Any] = []
+    if low := LOW.search(errand):
+        charge = {"sequence": [{"drive": DOCK}, {"dock": float(low[2])}]}
+        is_charged = {"check": {"battery_above": float(low[1]) / 100}}
+        steps.append({"fallback": [is_charged, charge]})
+    for part in PLACE.finditer(errand):
+        steps += await _go(driver, part, has_shut_door="door that is shut" in errand)
+        steps.append({"retry": SPEAK_TRIES, "do": [{"speak": part["words"]}]})
+    run = await driver.tools.demand(
+        "run_mission", tree=json.dumps(steps), within_min=WITHIN_MIN, wait_s=driver.wait_s
+    )
+    said = run.text
+    for _ in range(MOST_WAITS):
+        state = STATE.search(said)
+        if state is None:
+            return gave_up(said)
+        if state[1] != "running":
+            return AgentEnd(answer=f"The mission {state[1]}.")
+        said = (await driver.tools.demand("skill_status", wait_s=driver.wait_s)).text
+    return gave_up("The mission does not end.")
+
+
+async def _go(
+    driver: ToolDriver, part: re.Match[str], *, has_shut_door: bool
+) -> list[dict[str, Any]]:
+    """Return the steps to a place; where a door may be shut, by the door, which is opened first."""
+    if part["label"] is not None:
+        return [{"drive": f"nearest {part['label']}"}]
+    point = Point(float(part["x"]), float(part["y"]))
+    goal = {"drive": f"{point.x:.2f}, {point.y:.2f}"}
+    if not has_shut_door:
+        return [goal]
+    region = await driver.find_region(point)
+    rows = (await driver.look()).rows("Doors")
+    doors = [row.id for row in rows if re.search(rf"\b{region}\b", row.cells["joins"])]
+    open_each: list[dict[str, Any]] = [
+        {"sequence": [{"drive": f"in front of {door}"}, {"open_door": {}}]} for door in doors
+    ]
+    return [{"fallback": [*open_each, {"wait": 1}]}, goal]
