@@ -119,6 +119,7 @@ SIGHTING = re.compile(
     r"^- (?P<label>[^,]+), (?P<bearing>[+-][\d.]+) deg, (?P<range>[\d.]+) m",
     re.MULTILINE,
 )
+TAKEN = re.compile(r"taken at x (-?[\d.]+), y (-?[\d.]+), yaw (-?[\d.]+) deg")
 CLEAR_RANGE_M = 6.0
 """Farther things are left to a waypoint that is nearer to them."""
 
@@ -236,7 +237,9 @@ class ToolDriver:
         """Return the id of the room, corridor or hall at a point; empty where there is none."""
         place = f"{point.x:.2f}, {point.y:.2f}"
         text = (await self.tools.demand("describe_place", place=place)).text
-        found = REGION.search(text.partition("\n")[0])
+        # The first answer of a session says first what is remembered.
+        said = next((line for line in text.splitlines() if " is at " in line), "")
+        found = REGION.search(said)
         return found.group() if found else ""
 
     async def see(self) -> tuple[DetectedThing, ...]:
@@ -247,12 +250,19 @@ class ToolDriver:
         """Return what the detector reports beside a picture, as far as this one sees."""
         return tuple(each for each in read_sightings(text) if each.range_m <= self.sight_m)
 
-    async def record(self, sightings: tuple[DetectedThing, ...]) -> None:
-        """Remember what is seen from here, under a number."""
+    async def record(self, sightings: tuple[DetectedThing, ...], **taken_at: float) -> None:
+        """Remember under a number what is seen from here, or from x, y and yaw_deg."""
         self._n_views += 1
         place = (await self.tools.demand("get_robot_pose")).report["place"]
         record = describe_view(self._n_views, place, sightings)
-        await self.tools.demand("write_semantic_data", **record)
+        await self.tools.demand("write_semantic_data", **record, **taken_at)
+
+    async def record_around(self) -> None:
+        """Look to all sides, and remember what each picture shows."""
+        text = (await self.tools.demand("look_around")).text
+        for match, rest in zip(TAKEN.finditer(text), TAKEN.split(text)[4::4], strict=True):
+            x, y, yaw_deg = (float(part) for part in match.groups())
+            await self.record(self.note(rest), x=x, y=y, yaw_deg=yaw_deg)
 
 
 CUES = (

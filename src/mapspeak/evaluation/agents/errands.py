@@ -1,8 +1,10 @@
 """How the scripted policy does a composed errand: it reads it into a mission, and has that run."""
 
-import json
+import io
 import re
 from typing import Any
+
+from ruamel.yaml import YAML
 
 from mapspeak.evaluation.agent import AgentEnd, gave_up
 from mapspeak.evaluation.agents.driver import ToolDriver
@@ -30,8 +32,10 @@ async def do_errand(driver: ToolDriver, errand: str) -> AgentEnd:
     for part in PLACE.finditer(errand):
         steps += await _go(driver, part, has_shut_door="door that is shut" in errand)
         steps.append({"retry": SPEAK_TRIES, "do": [{"speak": part["words"]}]})
+    tree = io.StringIO()
+    YAML(typ="safe", pure=True).dump(steps, tree)
     run = await driver.tools.demand(
-        "run_mission", tree=json.dumps(steps), within_min=WITHIN_MIN, wait_s=driver.wait_s
+        "run_mission", tree=tree.getvalue(), within_min=WITHIN_MIN, wait_s=driver.wait_s
     )
     said = run.text
     for _ in range(MOST_WAITS):
@@ -58,6 +62,6 @@ async def _go(
     rows = (await driver.look()).rows("Doors")
     doors = [row.id for row in rows if re.search(rf"\b{region}\b", row.cells["joins"])]
     open_each: list[dict[str, Any]] = [
-        {"sequence": [{"drive": f"in front of {door}"}, {"open_door": {}}]} for door in doors
+        {"sequence": [{"drive": f"in front of {door}"}, "open_door"]} for door in doors
     ]
     return [{"fallback": [*open_each, {"wait": 1}]}, goal]

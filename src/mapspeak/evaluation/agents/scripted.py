@@ -68,12 +68,20 @@ async def follow_script(
 
 
 MOST_STOPS = 200
+LOOK_AROUND_EVERY_M = 4.0
 
 
 async def _explore(driver: ToolDriver, _match: re.Match[str]) -> AgentEnd:
-    """Let the robot explore until pictures show all walls, and record what is seen at each stop."""
-    await driver.record(await driver.see())
+    """Let the robot explore until pictures show all walls, and record what is seen at each stop.
+
+    Where it has not looked around near by it looks to all sides, for what no wall is behind.
+    """
+    looked_from: list[Point] = []
     for _ in range(MOST_STOPS):
+        here = (await driver.find_pose()).point
+        if all(here.distance_to(place) >= LOOK_AROUND_EVERY_M for place in looked_from):
+            looked_from.append(here)
+            await driver.record_around()
         answer = await driver.tools.demand(
             "explore", cover="camera", stops_at_goals=True, wait_s=driver.wait_s
         )
