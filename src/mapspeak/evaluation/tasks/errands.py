@@ -5,7 +5,7 @@ from typing import Any
 
 from mapspeak.evaluation.scores.judging import Evidence, verdict
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
-from mapspeak.evaluation.tasks.failures import find_doors_into_rooms
+from mapspeak.evaluation.tasks.failures import find_doors
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
 from mapspeak.evaluation.tasks.things import findable_kinds
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
@@ -104,7 +104,8 @@ def _only_doors(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRoom]]:
     """Return doors without which nothing leads into their rooms."""
     return [
         (door, room)
-        for door, room in find_doors_into_rooms(site)
+        for door, rooms in find_doors(site)
+        for room in rooms
         if sum(room.room.name in passage.spaces for passage in site.passages) == 1
     ]
 

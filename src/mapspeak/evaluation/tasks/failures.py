@@ -42,7 +42,7 @@ ROOM_LEFT_RATIO = 0.5
 def _draw_blocked_way(draw: Draw) -> Setting:
     """Draw a door that the map shows and crates block: there is another way, or none."""
     site = draw.site
-    for door, room in draw.shuffled(find_doors_into_rooms(site)):
+    for door, (room, _) in draw.shuffled(find_doors(site)):
         crates = _close_door(door)
         blocked = site.with_more(crates)
         goal = site.cells_of(room)
@@ -115,8 +115,8 @@ def _untouched(evidence: Evidence, score: Score) -> Score:
     return replace(score, is_success=False, failure=Failure.COLLIDED, reason=reason)
 
 
-def find_doors_into_rooms(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRoom]]:
-    """Return doors with the smaller of the two spaces that they lead into."""
+def find_doors(site: GroundTruth) -> list[tuple[WorldDoor, tuple[MeasuredRoom, MeasuredRoom]]]:
+    """Return doors with the two spaces that they lead into, the smaller one first."""
     found = []
     map_from_world = site.world.start.inverse()
     for door in site.world.doors:
@@ -126,7 +126,8 @@ def find_doors_into_rooms(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRo
             continue
         rooms = [room for room in site.rooms if room.room.name in passage.spaces]
         if len(rooms) > 1:
-            found.append((door, min(rooms, key=lambda room: room.outline_area_m2)))
+            small, large = sorted(rooms, key=lambda room: room.outline_area_m2)
+            found.append((door, (small, large)))
     return found
 
 
@@ -256,7 +257,7 @@ FAILURE_TASKS = (
         name="blocked-way",
         draw=_draw_blocked_way,
         judge=_judge_blocked_way,
-        is_offered=lambda site: bool(find_doors_into_rooms(site)),
+        is_offered=lambda site: bool(find_doors(site)),
     ),
     Task(
         name="stale-map",

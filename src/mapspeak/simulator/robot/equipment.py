@@ -71,7 +71,7 @@ class Equipment:
         n_left = self._n_faults_left.get(skill, 0)
         self._n_faults_left[skill] = max(n_left - 1, 0)
         if n_left:
-            self.note(f"{skill} fault", f"{n_left} left")
+            self.note(f"{skill} fault", f"{n_left - 1} left")
         return n_left > 0
 
     def note(self, skill: str, what: str) -> None:
