@@ -43,7 +43,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     default="paper",
     show_default=True,
     help="Tasks, or groups of them: paper, rooms, objects, relations, routes, search, questions, "
-    "failures, inspection, all.",
+    "failures, errands, inspection, all.",
 )
 @click.option(
     "--worlds",
