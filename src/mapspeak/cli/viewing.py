@@ -14,7 +14,7 @@ import click
 from anyio.abc import TaskStatus
 
 from mapspeak.cli.options import CONTROL_OPTION, FILE, control_folder, usual_modes
-from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
@@ -89,13 +89,20 @@ class LivePage:
 
     async def _answer(self, is_wanted: anyio.Event) -> None:
         """Tell those who ask where the page is, once it is there."""
-        robots = ", ".join(feed.session.robot.description.name for feed in self.feeds.values())
         while True:
             for request in self.desk.find_requests():
                 is_wanted.set()
                 if self._urls:
+                    robots = ", ".join(map(_name_of, self.feeds.values()))
                     self.desk.answer(request, self.keys, robots=robots, url=self._urls[-1])
             await anyio.sleep(LOOK_S)
+
+
+def _name_of(feed: "ViewFeed") -> str:
+    try:
+        return feed.session.robot.description.name
+    except LinkError:
+        return "a robot that is not there yet"
 
 
 def _find_free(address: str) -> str:

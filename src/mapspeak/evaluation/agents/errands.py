@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -17,19 +18,28 @@ PLACE = re.compile(
 LOW = re.compile(r"battery is below (\d+) %.+ to (\d+) % before", re.DOTALL)
 STATE = re.compile(r"\): (\w+) after")
 WITHIN_MIN = 50.0
+Search = Callable[[ToolDriver, str], Awaitable[AgentEnd]]
 MOST_WAITS = 150
 SPEAK_TRIES = 3
 DOCK = "nearest charging dock"
 
 
-async def do_errand(driver: ToolDriver, errand: str) -> AgentEnd:
-    """Run an errand as one mission, and say how that ended."""
+async def do_errand(driver: ToolDriver, errand: str, search: Search) -> AgentEnd:
+    """Run an errand as one mission, and say how that ended.
+
+    Args:
+        search: Finds a thing that is not remembered, and drives up to it.
+    """
     steps: list[Any] = []
     if low := LOW.search(errand):
         charge = {"sequence": [{"drive": DOCK}, {"dock": float(low[2])}]}
         is_charged = {"check": {"battery_above": float(low[1]) / 100}}
         steps.append({"fallback": [is_charged, charge]})
     for part in PLACE.finditer(errand):
+        label = part["label"]
+        if label is not None and not await driver.find_things(label):
+            await search(driver, label)
+            await driver.record(await driver.see())
         steps += await _go(driver, part, has_shut_door="door that is shut" in errand)
         steps.append({"retry": SPEAK_TRIES, "do": [{"speak": part["words"]}]})
     tree = io.StringIO()

@@ -308,7 +308,7 @@ BESIDE_POSE = (
 )
 DEEDS: tuple[tuple[str, Deed], ...] = (
     (r"^Inspect the robot's ROS\.", lambda driver, match: diagnose(driver.tools, match.string)),
-    (r"^Errand, ", lambda driver, match: do_errand(driver, match.string)),
+    (r"^Errand, ", lambda driver, match: do_errand(driver, match.string, _search)),
     (r"Answer without driving\.", lambda driver, match: _answer_question(driver, match.string)),
     (r"^Update the map", _explore),
     (rf"around \((?P<x>{NUMBER}), (?P<y>{NUMBER})\) by its sketch", _go_by_note),

@@ -7,7 +7,7 @@ from mapspeak.evaluation.scores.judging import Evidence, verdict
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.failures import find_doors
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
-from mapspeak.evaluation.tasks.things import findable_kinds
+from mapspeak.evaluation.tasks.things import SEARCH_TOOLS, findable_kinds
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point
 from mapspeak.server.app import DEFAULT_TOOLSETS
@@ -57,6 +57,7 @@ def _setting(draw: Draw, parts: list[tuple[str, Step]], advice: str = "", **more
         is_known=True,
         memory=draw.memory,
         toolsets=(*DEFAULT_TOOLSETS, "missions"),
+        tools=SEARCH_TOOLS,
         limits=LIMITS,
         truth=truth,
         **more,
