@@ -40,6 +40,7 @@ class FramedMemory(MemoryStore):
         super().__init__(path=store.path, walls=store.walls, map_id=store.map_id)
         self.store = store
         self.keeper = FrameKeeper(store, name_robot=name_robot, lock=lock)
+        self._read: tuple[SemanticMap, object, SemanticMap] | None = None
         self._moved: dict[int, tuple[Waypoint, Pose, Waypoint]] = {}
 
     def meet(self, grid: OccupancyGrid) -> None:
@@ -51,7 +52,16 @@ class FramedMemory(MemoryStore):
 
         Before there is a map, all are given as they are: they lead nowhere without one.
         """
-        memory = self.store.read().present()
+        memory, here = (
+            self.store.read(),
+            (self.keeper.has_met, self.keeper.is_placed, self.keeper.frame),
+        )
+        if self._read is None or self._read[0] is not memory or self._read[1] != here:
+            self._read = (memory, here, self._place_all(memory.present()))
+        n_elsewhere = len(self.store.read_events()) - len(self.read_events())
+        return replace(self._read[2], n_events_elsewhere=n_elsewhere)
+
+    def _place_all(self, memory: SemanticMap) -> SemanticMap:
         if not self.keeper.has_met:
             return memory
         here: list[Waypoint] = []
@@ -61,12 +71,7 @@ class FramedMemory(MemoryStore):
             (elsewhere if placed is None else here).append(placed or waypoint)
         if len(self._moved) > MOST_KEPT * max(len(memory.waypoints), 1):
             self._moved.clear()  # Most are of records that read otherwise by now.
-        return replace(
-            memory,
-            waypoints=tuple(here),
-            elsewhere=tuple(elsewhere),
-            n_events_elsewhere=len(self.store.read_events()) - len(self.read_events()),
-        )
+        return replace(memory, waypoints=tuple(here), elsewhere=tuple(elsewhere))
 
     def read_events(self) -> tuple[Event, ...]:
         """Return the events in the frame of the robot's map, and no others.

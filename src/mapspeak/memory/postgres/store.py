@@ -8,6 +8,7 @@ something is written under its key again.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
@@ -49,7 +50,7 @@ _UPSERT = """
 _FROM_THE_BEGINNING = "0"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class _Known:
     """What the database said when it was last read.
 
@@ -66,7 +67,8 @@ class _Known:
     def of(self, kind: str) -> Mapping[str, Any]:
         return self.records.get(kind, {})
 
-    def to_map(self) -> SemanticMap:
+    @cached_property
+    def places(self) -> SemanticMap:
         frames = tuple(self.of(_FRAME).values())
         return SemanticMap(
             map_id=self.of(_ENTRY).get("map"),
@@ -97,11 +99,11 @@ class PostgresStore(MemoryStore):
         While the database cannot be reached, the places read before are given, with a warning.
         """
         try:
-            return self._look().to_map()
+            return self._look().places
         except SemanticMapError as fault:
             if self._known is None:
                 raise
-            places = self._known.to_map()
+            places = self._known.places
             warning = f"{fault} Until then, the waypoints read before are given."
             return replace(places, warnings=(*places.warnings, warning))
 
@@ -188,7 +190,7 @@ class _Rows:
 
     def read(self) -> SemanticMap:
         """Return all places."""
-        return self._read_all(self._connection).to_map()
+        return self._read_all(self._connection).places
 
     def read_events(self) -> Mapping[str, Event]:
         """Return all events by their ids."""
