@@ -21,10 +21,9 @@ from mapspeak.server.tools.ros.measuring import check_frames
 from mapspeak.server.tools.ros.reports import (
     Filter,
     Page,
-    choose,
     cut,
+    list_page,
     say_loss,
-    say_page,
     show_message,
 )
 from mapspeak.server.tools.ros.views import view_fields
@@ -79,15 +78,8 @@ class ActionTools:
         Use it to find one.
         """
         actions = await self._inquiry.fetch_actions()
-        types = {name: await self._say_type(name) for name in actions}
-        chosen = choose(list(types.items()), filter, texts=lambda item: item)
-        return say_page(
-            "actions",
-            chosen,
-            page,
-            line=lambda item: f"{item[0]} {item[1]}",
-            n_all=len(actions),
-        )
+        lines = {name: f"{name} {await self._say_type(name)}" for name in actions}
+        return list_page("actions", lines, filter, page)
 
     @tool("One ROS action", ToolEffect.READS, leads="Use it before {ros_send_goal}.")
     async def ros_action(self, action: Action, type: ActionType = None) -> str:  # noqa: A002
@@ -119,7 +111,7 @@ class ActionTools:
         self._commands.check_name(Act(action=name, type=type or "", goal=fields))
         said = await self._find_type(name, type)
         described = await self._inquiry.describe(said)
-        checked = check_message(described.book, described.part(0), fields)
+        checked = check_message(described.book, described.parts[0], fields)
         await check_frames(self._inquiry, checked)
         self._described[name] = described
         client = client_of(context)
@@ -171,9 +163,7 @@ class ActionTools:
         return self._say_job(job)
 
     async def _say_listed(self, action: str) -> str:
-        listed = await self._book.fetch_listed(action)
-        lines = [f"{goal.id}: {goal.state}, {goal.said}" for goal in listed]
-        heard_s = await self._book.fetch_heard_s(action)
+        lines, heard_s = await self._book.list_goals(action)
         loss = say_loss(self._inquiry.connection, since_s=heard_s)
         head = f"{say_count(len(lines), 'goal')}, by the server's ids:"
         return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *([loss] if loss else [])])
@@ -208,7 +198,7 @@ class ActionTools:
 
     def _show_result(self, action: str, result: Message) -> str:
         described = self._described.get(action)
-        fields = () if described is None else described.book[described.part(1)].fields
+        fields = () if described is None else described.book[described.parts[1]].fields
         views, plain = view_fields(fields, result)
         shown = [f"{name}: {view.text}" for name, view in views.items()]
         return "\n".join([*shown, *([show_message(plain)] if plain or not shown else [])])

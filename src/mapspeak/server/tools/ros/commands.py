@@ -1,9 +1,8 @@
 """Everything the ROS tools change on the robot, through one door; publishing too."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any
 
 import anyio
 
@@ -42,7 +41,7 @@ VELOCITIES = frozenset(
 
 
 class RosCommands:
-    """Publishes, calls, sends goals and sets parameters: by the methods of the port alone.
+    """Asks the guard, and publishes by the methods of the port alone.
 
     Args:
         connection: Gives the connection, which may be guarded.
@@ -80,9 +79,10 @@ class RosCommands:
             while not await fetch(topic):  # noqa: ASYNC110 - it happens in other programs
                 await anyio.sleep(LOOK_S)
 
-    async def publish(self, topic: str, message: Message) -> None:
-        """Publish one message on a topic that was prepared."""
-        await self._connection().publish(topic, message)
+    @property
+    def connection(self) -> RosConnection:
+        """The connection, which may be guarded."""
+        return self._connection()
 
     async def publish_at_once(self, topic: str, message: Message) -> None:
         """Publish one message on a topic that was prepared, now or not at all.
@@ -115,23 +115,6 @@ class RosCommands:
                     n_sent += 1
                 await anyio.sleep(PAUSE_S)
         return n_sent > 0
-
-    async def call(
-        self, service: str, arguments: Mapping[str, Any], *, type_name: str, timeout_s: float
-    ) -> dict[str, Any]:
-        """Return what a service answers."""
-        return await self._connection().call_service(
-            service, arguments, type_name=type_name, timeout_s=timeout_s
-        )
-
-    async def set_parameter(
-        self,
-        node: str,
-        name: str,
-        value: Any,  # noqa: ANN401 - any value ROS has
-    ) -> None:
-        """Set a node's parameter."""
-        await self._connection().set_parameter(node, name, value)
 
 
 STOP = "{stop_robot} ends it."
@@ -215,7 +198,7 @@ class Publisher:
             )
         if wanted.duration_s is not None:
             return await self._send_for(wanted, wanted.duration_s, ticket)
-        await self._commands.publish(wanted.topic, wanted.message)
+        await self._commands.connection.publish(wanted.topic, wanted.message)
         return f"Published once on {wanted.topic}"
 
     async def _send_for(self, wanted: PublishRequest, duration_s: float, ticket: int) -> str:

@@ -7,7 +7,7 @@ import anyio
 
 from mapspeak.errors import GoalError
 from mapspeak.ros.actions import ActionClient, open_action
-from mapspeak.ros.activity import ActionGoal, ActionState
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.server.text.offered import lead
 from mapspeak.server.tools.ros.commands import Publisher, RosCommands
@@ -33,21 +33,6 @@ class TrackedGoal:
     action: ActionClient
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ListedGoal:
-    """A goal that an action server knows.
-
-    Attributes:
-        id: The server's.
-        state: As the server says.
-        said: Whose it is.
-    """
-
-    id: str
-    state: ActionState
-    said: str
-
-
 class ActionBook:
     """Sends goals and keeps what becomes of them, also after their end.
 
@@ -61,11 +46,6 @@ class ActionBook:
         self._commands = commands
         self._jobs: OrderedDict[str, TrackedGoal] = OrderedDict()
         self._n_sent = 0
-
-    @property
-    def handles(self) -> list[str]:
-        """The handles of the goals that are kept."""
-        return list(self._jobs)
 
     async def send(
         self,
@@ -111,7 +91,7 @@ class ActionBook:
         key = next(reversed(self._jobs), "") if handle is None else handle.strip().upper()
         job = self._jobs.get(key)
         if job is None:
-            known = ", ".join(self.handles[-5:])
+            known = ", ".join(list(self._jobs)[-5:])
             raise GoalError(
                 f"There is no goal {handle[:40]!r}." if handle else "No goal has been sent yet.",
                 hint=f"The latest are {known}." if known else lead("{ros_send_goal} sends one."),
@@ -144,8 +124,11 @@ class ActionBook:
             await goal.wait_until_over(within_s=self._inquiry.connection.patience.end_s)
         return n_cancelled
 
-    async def fetch_listed(self, action: str) -> list[ListedGoal]:
-        """Return each goal that an action server knows, ours and others'."""
+    async def list_goals(self, action: str) -> tuple[list[str], float]:
+        """Return a line for each goal that an action server knows, and when its list came.
+
+        The time is that of the event loop's clock.
+        """
         client = await self._find_client(action)
         await client.wait_for_list()
         handles = {job.goal.id: job.handle for job in self._jobs.values()}
@@ -153,14 +136,11 @@ class ActionBook:
             server_id: f"ours, {handles.get(goal.id, 'of a drive')}"
             for server_id, goal in client.ours.items()
         }
-        return [
-            ListedGoal(id=goal_id, state=state, said=ours.get(goal_id, "not ours"))
+        lines = [
+            f"{goal_id}: {state}, {ours.get(goal_id, 'not ours')}"
             for goal_id, state in client.listed.items()
         ]
-
-    async def fetch_heard_s(self, action: str) -> float:
-        """Return when an action server's list of goals came, by the event loop's clock."""
-        return (await self._find_client(action)).listed_s
+        return lines, client.listed_s
 
     async def _find_client(self, action: str) -> ActionClient:
         known = self._inquiry.connection.started.actions.get(action)

@@ -46,10 +46,6 @@ class Described:
         """What it is the type of: "msg", "srv" or "action"."""
         return {1: "msg", 2: "srv", 3: "action"}[len(self.parts)]
 
-    def part(self, number: int) -> str:
-        """Return the name of a part: 0 is what is sent."""
-        return self.parts[number]
-
     def say(self) -> str:
         """Return its fields down to the plain values, part by part."""
         told: list[str] = []

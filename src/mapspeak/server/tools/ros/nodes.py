@@ -19,9 +19,9 @@ from mapspeak.server.tools.ros.reports import (
     PAGE_SIZE,
     Filter,
     Page,
-    choose,
     cut,
-    say_page,
+    list_page,
+    match_names,
     show_value,
 )
 from mapspeak.server.tools.toolset import ToolEffect, tool
@@ -97,8 +97,7 @@ class NodeTools:
         Use it to see what runs.
         """
         nodes = await self._inquiry.connection.fetch_nodes()
-        chosen = choose(nodes, filter, texts=lambda name: [name])
-        return say_page("nodes", chosen, page, line=lambda name: name, n_all=len(nodes))
+        return list_page("nodes", {name: name for name in nodes}, filter, page)
 
     @tool("One ROS node", ToolEffect.READS, leads="{ros_parameters} gives its settings.")
     async def ros_node(self, node: Node) -> str:
@@ -132,19 +131,14 @@ class NodeTools:
         """
         name = _node_name(node)
         names = await self._fetch_names(name)
-        chosen = choose(names, filter, texts=lambda each: [each])
+        chosen = match_names(names, filter)
         shown = chosen[(page - 1) * PAGE_SIZE : page * PAGE_SIZE]
         values = await self._fetch_values(name, shown)
         notes = await self._describe(name, chosen) if len(chosen) <= MOST_DESCRIBED else {}
-        return cut(
-            say_page(
-                f"parameters of {name}",
-                chosen,
-                page,
-                line=lambda each: f"{each}: {show_value(values.get(each))}{notes.get(each, '')}",
-                n_all=len(names),
-            )
-        )
+        lines = {
+            each: f"{each}: {show_value(values.get(each))}{notes.get(each, '')}" for each in chosen
+        }
+        return cut(list_page(f"parameters of {name}", lines, None, page, len(names)))
 
     @tool(
         "Set a ROS parameter",
@@ -169,7 +163,7 @@ class NodeTools:
         if is_ros1:
             value = keep_kind(before, value, name=f"{parameter} of {name}")
             notes.append(READ_AT_START)
-        await self._commands.set_parameter(name, parameter, value)
+        await connection.set_parameter(name, parameter, value)
         after = await connection.fetch_parameter(name, parameter)
         said = f"{parameter} of {name} was {show_value(before)}, is {show_value(after)} now."
         return " ".join([said, *notes])
@@ -203,7 +197,7 @@ class NodeTools:
                 f"{node} has no parameter {parameter[:80]!r}.",
                 hint=lead("{ros_parameters} lists them."),
             )
-        await self._commands.set_parameter(node, parameter, None)
+        await self._inquiry.connection.set_parameter(node, parameter, None)
 
     async def _fetch_names(self, node: str) -> tuple[str, ...]:
         try:

@@ -3,8 +3,9 @@
 import fnmatch
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, TypeVar
+import re
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
 
 import anyio
 import numpy as np
@@ -152,8 +153,6 @@ def _show_text(text: str) -> str:
     return f"{shown} ({len(text):,} letters)"
 
 
-Item = TypeVar("Item")
-
 PAGE_SIZE = 40
 
 Filter = Annotated[
@@ -163,42 +162,50 @@ Filter = Annotated[
 Page = Annotated[int, Field(description="1 is the first", ge=1, le=1000)]
 
 
-def choose(
-    items: Sequence[Item], pattern: str | None, *, texts: Callable[[Item], Sequence[str]]
-) -> list[Item]:
-    """Return the items one of whose texts a pattern fits; one without a star fits any part."""
+def match_names(names: Mapping[str, str] | Sequence[str], pattern: str | None) -> list[str]:
+    """Return the names that a pattern fits; one without a star fits any part.
+
+    Args:
+        names: Those of a mapping are also chosen by the words of the lines that tell them.
+        pattern: None fits all.
+    """
+    lines = names if isinstance(names, Mapping) else {name: name for name in names}
     if not pattern:
-        return list(items)
-    wanted = pattern if any(sign in pattern for sign in "*?[") else f"*{pattern}*"
-    return [
-        item
-        for item in items
-        if any(fnmatch.fnmatchcase(text.lower(), wanted.lower()) for text in texts(item))
-    ]
+        return list(lines)
+    wanted = (pattern if any(sign in pattern for sign in "*?[") else f"*{pattern}*").lower()
+    return [name for name, line in lines.items() if fnmatch.filter(_words(line), wanted)]
 
 
-def say_page(
-    what: str, items: Sequence[Item], page: int, *, line: Callable[[Item], str], n_all: int
+def _words(line: str) -> list[str]:
+    """Return the words of a line, types also as "package/Type"."""
+    words = line.lower().split()
+    return [*words, *(re.sub("/(msg|action)/", "/", each) for each in words)]
+
+
+def list_page(
+    what: str, lines: Mapping[str, str], pattern: str | None, page: int, n_all: int | None = None
 ) -> str:
-    """Return a heading and a line for each item of a page.
+    """Return a heading and a page of lines.
 
     Args:
         what: The items are, in the plural.
-        items: All that were chosen.
+        lines: By name: all, or those that were chosen already.
+        pattern: Fits the names that are told.
         page: 1 is the first.
-        line: Says one.
-        n_all: How many there were to choose from.
+        n_all: How many there are to choose from; None where all are given.
     """
-    shown = items[(page - 1) * PAGE_SIZE : page * PAGE_SIZE]
-    of_all = "" if len(items) == n_all else f" of {n_all}"
-    head = f"{what}: {len(items)}{of_all}"
-    n_pages = max(1, -(-len(items) // PAGE_SIZE))
+    names = match_names(lines, pattern)
+    n_all = len(lines) if n_all is None else n_all
+    of_all = "" if len(names) == n_all else f" of {n_all}"
+    head = f"{what}: {len(names)}{of_all}"
+    n_pages = max(1, -(-len(names) // PAGE_SIZE))
     if page > n_pages:
         last = "the only one" if n_pages == 1 else "the last"
         return f"{head}. There is no page {page}: page {n_pages} is {last}."
     if n_pages > 1:
         head += f", page {page} of {n_pages}"
-    return "\n".join([head, *(line(item) for item in shown)])
+    shown = names[(page - 1) * PAGE_SIZE : page * PAGE_SIZE]
+    return "\n".join([head, *(lines[name] for name in shown)])
 
 
 def say_loss(connection: RosConnection, *, since_s: float) -> str:

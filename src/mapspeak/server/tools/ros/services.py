@@ -14,7 +14,7 @@ from mapspeak.server.tools.ros.census import find_server
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import say_stamp
-from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_page, show_message
+from mapspeak.server.tools.ros.reports import Filter, Page, cut, list_page, show_message
 from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
@@ -58,12 +58,9 @@ class ServiceTools:
         Use it to find one.
         """
         services = await self._inquiry.connection.fetch_services()
-        chosen = choose(services, filter, texts=lambda name: [name])
-        folded: list[str] = []
-        if not filter:
-            chosen, folded = _fold(services)
-        text = say_page("services", chosen, page, line=lambda name: name, n_all=len(services))
-        return "\n".join([text, *folded])
+        chosen, folded = (services, []) if filter else _fold(services)
+        lines = {name: name for name in chosen}
+        return "\n".join([list_page("services", lines, filter, page, len(services)), *folded])
 
     @tool("One ROS service", ToolEffect.READS, leads="Use it before {ros_call}.")
     async def ros_service(self, service: Service) -> str:
@@ -94,15 +91,17 @@ class ServiceTools:
         said = await self._inquiry.said(type_name, kind="srv")
         self._commands.check_name(Call(service=name, type=said, arguments=fields or {}))
         described = await self._inquiry.describe(said)
-        request = check_message(described.book, described.part(0), fields or {})
-        answer = await self._commands.call(name, request, type_name=said, timeout_s=timeout_s)
+        request = check_message(described.book, described.parts[0], fields or {})
+        answer = await self._inquiry.connection.call_service(
+            name, request, type_name=said, timeout_s=timeout_s
+        )
         return await self._show(f"{name} ({said}) answered:", described, answer)
 
     async def _show(
         self, head: str, described: Described, answer: dict[str, Any]
     ) -> list[str | Image]:
         """Return the response; maps and the like within it as they are shown elsewhere."""
-        fields = described.book[described.part(1)].fields
+        fields = described.book[described.parts[1]].fields
         views, plain = await self._session.compute(partial(view_fields, fields, answer))
         parts: list[str] = [head]
         for name, view in views.items():

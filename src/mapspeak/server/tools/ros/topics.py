@@ -1,7 +1,6 @@
 """The tools about topics: what there is, what it looks like, listening, publishing."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Annotated, Any
 
 import anyio
@@ -18,7 +17,7 @@ from mapspeak.server.tools.ros.commands import VELOCITIES, Publisher, PublishReq
 from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
 from mapspeak.server.tools.ros.measuring import check_frames, say_silence
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
-from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_loss, say_page
+from mapspeak.server.tools.ros.reports import Filter, Page, cut, list_page, match_names, say_loss
 from mapspeak.server.tools.ros.views import BULKY, MessageView, view_message
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
@@ -93,21 +92,22 @@ class TopicTools:
         Use it to find a topic, by its name or type.
         """
         graph = await self._inquiry.fetch_topics()
-        topics = sorted(graph.types.items())
-        chosen = choose(topics, filter, texts=lambda item: item)
-        listed = partial(say_page, "topics", chosen, page, n_all=len(topics))
+        lines = {
+            name: f"{name} {graph.dialect.type_name(kind)}"
+            for name, kind in sorted(graph.types.items())
+        }
         if not ends:
-            return listed(line=lambda item: f"{item[0]} {graph.dialect.type_name(item[1])}")
+            return list_page("topics", lines, filter, page)
         connection = self._inquiry.connection
         census = await take_census(connection, await connection.fetch_nodes())
-        text = listed(
-            line=lambda item: (
-                f"{item[0]} {graph.dialect.type_name(item[1])} "
-                f"published by {census.publishers_of(item[0]).count()}, "
-                f"heard by {census.hearers_of(item[0]).count()}"
-            )
-        )
-        return cut("\n".join([text, *_say_loose_ends(census, [name for name, _ in chosen])]))
+        chosen = match_names(lines, filter)
+        counted = {
+            name: f"{lines[name]} published by {census.publishers_of(name).count()}, "
+            f"heard by {census.hearers_of(name).count()}"
+            for name in chosen
+        }
+        text = list_page("topics", counted, None, page, len(lines))
+        return cut("\n".join([text, *_say_loose_ends(census, chosen)]))
 
     @tool("One ROS topic", ToolEffect.READS, leads="Use it before {ros_publish} too.")
     async def ros_topic(self, topic: Topic) -> str:

@@ -113,7 +113,7 @@ class InterfaceSkill(ABC):
         self.ros = ros
         self.described = described
         reads = interface.kind is InterfaceKind.READ
-        self.sent = build_layout(described.book, described.part(0), reserved=reserved)
+        self.sent = build_layout(described.book, described.parts[0], reserved=reserved)
         parameters = () if reads else self.sent.parameters
         if self.is_velocity:
             parameters = (*parameters, DURATION)
@@ -151,7 +151,7 @@ class InterfaceSkill(ABC):
         """
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
         given.pop(DURATION.name, None)
-        book, part = self.described.book, self.described.part(0)
+        book, part = self.described.book, self.described.parts[0]
         message = check_message(book, part, self.sent.build(given))
         if self.interface.kind in (InterfaceKind.ACTION, InterfaceKind.PUBLISH):
             await check_frames(self.ros.inquiry, message)
@@ -160,7 +160,7 @@ class InterfaceSkill(ABC):
     def read(self, part: int, message: Message) -> dict[str, JsonValue]:
         """Return what came back, named as arguments would be."""
         try:
-            return build_layout(self.described.book, self.described.part(part)).read(message)
+            return build_layout(self.described.book, self.described.parts[part]).read(message)
         except LinkError:
             return {}
 
@@ -177,7 +177,7 @@ class ServiceSkill(InterfaceSkill):
         said = await self.ros.inquiry.said(self.interface.type, kind="srv")
         self.ros.commands.check_name(Call(service=name, type=said, arguments={}))
         request = await self.check(arguments)
-        answer = await self.ros.commands.call(
+        answer = await self.ros.inquiry.connection.call_service(
             name, request, type_name=said, timeout_s=self.spec.timeout_s
         )
         outputs = self.read(1, answer)
