@@ -205,4 +205,5 @@ async def test_an_exploration_is_shown_in_the_chat(tmp_path: Path) -> None:
         await expect(app.get_by_role("button", name="Go to F")).to_be_visible()
         await app.locator("#index summary").click()
         if KEEP in os.environ:
-            await page.screenshot(path=PICTURES / "chat-map.png")
+            shown = {"x": 170, "y": 0, "width": 940, "height": 560}
+            await page.screenshot(path=PICTURES / "chat-map.png", clip=shown)

@@ -171,6 +171,14 @@ async def test_a_stop_needs_no_key(tmp_path: Path) -> None:
     assert live.session.drives.under_way is None
 
 
+@pytest.mark.parametrize("body", [b"", b"[]", b"{", b'{"why": "x"}', b"x" * 5000])
+async def test_a_stop_is_never_refused_for_what_comes_with_it(tmp_path: Path, body: bytes) -> None:
+    async with serve_live(tmp_path) as live:
+        said = await live.http.post("/robots/robot/stop", content=body)
+    assert said.status_code == 200
+    assert live.robot.n_stops == 1
+
+
 async def test_a_stop_that_does_not_reach_the_robot_is_told_as_such(tmp_path: Path) -> None:
     class Deaf(FakeRobot):
         async def stop(self) -> None:

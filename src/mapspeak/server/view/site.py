@@ -39,7 +39,8 @@ HEADERS = (
 MOST_BYTES = 2_000
 """Of the body of a command."""
 CHECK = "check"
-FREE = frozenset({"stop", "hold", CHECK})
+STOPS = frozenset({"stop", "hold"})
+FREE = STOPS | {CHECK}
 """Need no key: what makes a robot stand must never wait, and a check moves nothing."""
 KEY, NAME_OF_PAGE = "x-mapspeak-key", "x-mapspeak-page"
 
@@ -151,7 +152,9 @@ class LiveSite:
         if name not in commands.by_name:
             raise HTTPException(HTTPStatus.NOT_FOUND)
         try:
-            said = await commands.carry_out(name, await _read_body(request))
+            # A stop has nothing to say, and is not refused for what it says.
+            body = {} if name in STOPS else await _read_body(request)
+            said = await commands.carry_out(name, body)
         except ValidationError as error:
             return _say(f"Not understood: {error.errors(include_url=False)[0]['msg']}.", 422)
         except MapspeakError as error:
