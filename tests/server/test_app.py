@@ -108,6 +108,15 @@ async def test_wrong_arguments_are_explained_without_a_link_to_a_library(tmp_pat
     assert "pydantic" not in text_of(result)
 
 
+async def test_text_that_is_not_unicode_is_refused(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("navigate_to", {"place": "\ud800"})
+
+    assert result.is_error
+    assert "navigate_to" in text_of(result)
+    assert "not valid Unicode" in text_of(result)
+
+
 async def test_wrong_arguments_are_named_as_the_caller_named_them(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         result = await client.call_tool(

@@ -235,7 +235,10 @@ class MapspeakServer(MCPServer[Any]):
 
         What is too large would cut the connection to a robot, which limits the size of a message.
         """
-        n_bytes = len(json.dumps(given, default=str))
+        try:
+            n_bytes = len(json.dumps(given, default=str, ensure_ascii=False).encode())
+        except UnicodeEncodeError as error:
+            raise ToolError(f"{name} was called with text that is not valid Unicode.") from error
         if n_bytes > MOST_BYTES:
             raise ToolError(
                 f"{name} was called with {n_bytes / 1e6:.1f} MB of arguments; at most "
