@@ -366,7 +366,7 @@ def _check_measure(
         straight_m = math.dist(start, end)
         yield (
             f"straight to {row['to']}",
-            abs(_number(row["straight m"]) - straight_m) <= ROUNDING + 0.01,
+            abs(_number(row["straight m"]) - straight_m) <= ROUNDING + 0.015,
         )
         yield (
             f"path to {row['to']} from {start}: {row['path m']}",
