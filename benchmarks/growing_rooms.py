@@ -9,8 +9,8 @@ A region told as seen whole is false when no true space covers the same floor wi
 over union of .5; corridors that meet without a wall may be one space or several. The smallest room
 is right when it covers the true smallest so, or one that is at most 5 % larger. It is unsure while
 a frontier may lead to another room, when it may grow beyond the second, and when a smaller one may
-be part of another. An id changes its owner when the true space that it shares most floor with is
-not the one at the look before.
+be part of another; what is probably part of another leaves nothing open. An id changes its owner
+when the true space that it shares most floor with is not the one at the look before.
 """
 
 import math
@@ -38,7 +38,7 @@ from mapspeak.session import Session
 from mapspeak.simulator import MeasuredRoom, Simulation, load_world, world_names
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import Region, RoomClass, RoomMap, find_rooms
-from mapspeak.worldmodel.model import HIDDEN_M2, WorldModel
+from mapspeak.worldmodel.model import HIDDEN_M2, HIDDEN_RATIO, WorldModel
 
 __all__ = ["measure"]
 
@@ -296,7 +296,9 @@ def list_by_size(rooms: RoomMap) -> list[Region]:
 def is_smallest_unsure(rooms: RoomMap, look: Look) -> bool:
     """Return True where the text leaves open which room is the smallest."""
     by_size = list_by_size(rooms)
-    if not by_size or (look.gains_m2 >= HIDDEN_M2).any():
+    known_m2 = sum(region.floor_area_m2 for region in rooms.regions)
+    is_much = look.gains_m2.sum() > HIDDEN_RATIO * known_m2
+    if not by_size or is_much or (look.gains_m2 >= HIDDEN_M2).any():
         return True
     smallest = by_size[0]
     there = rooms.grid.look_up(rooms.labels, look.borders, outside=0) == smallest.index
@@ -305,7 +307,9 @@ def is_smallest_unsure(rooms: RoomMap, look: Look) -> bool:
     return any(most_m2 > second.floor_area_m2 for second in by_size[1:2]) or any(
         region.floor_area_m2 <= smallest.floor_area_m2
         for region in rooms.regions
-        if region.room_class is not RoomClass.CORRIDOR and rooms.find_doubtful_door(region)
+        if region.room_class is not RoomClass.CORRIDOR
+        and (door := rooms.find_doubtful_door(region)) is not None
+        and door.is_likely
     )
 
 

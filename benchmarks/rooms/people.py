@@ -29,10 +29,12 @@ from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
 
 __all__ = [
     "Numbers",
+    "count_hallways",
     "find_agreement",
     "find_labelled_maps",
     "find_overlap",
     "list_labelled_maps",
+    "read_classes",
     "score_figures",
     "score_map",
     "show_maps",
@@ -143,7 +145,7 @@ def score_map(folder: Path) -> Score:
     truth = np.asarray(picture, np.intp)[::-1]
     overlap = find_overlap(rooms.labels.astype(np.intp), truth, loaded.grid.free & (truth > 0))
     agreement = find_agreement(overlap)
-    classes = _read_classes(meta)
+    classes = read_classes(meta)
     pairs = [(int(i), int(j)) for i, j in np.argwhere(agreement >= 0.5)]
     return Score(
         group=folder.parent.name,
@@ -153,13 +155,13 @@ def score_map(folder: Path) -> Score:
         n_found=int((overlap[1:].sum(axis=1) > 0).sum()),
         n_true=int((overlap[:, 1:].sum(axis=0) > 0).sum()),
         class_ratio=_class_ratio(rooms, classes, pairs) if classes else None,
-        hallways=_hallways(rooms, classes, overlap, pairs) if classes else None,
+        hallways=_hallways(rooms, classes, overlap) if classes else None,
         ranks_right=_ranks_right(rooms, classes, truth, agreement) if classes else None,
         time_ms=time_ms,
     )
 
 
-def _read_classes(meta: dict[str, Any]) -> dict[int, str]:
+def read_classes(meta: dict[str, Any]) -> dict[int, str]:
     """Return "room" or "hallway" for each number that has a class."""
     named = {room["id"]: room.get("type", room.get("class")) for room in meta.get("rooms", ())}
     return {number: each for number, each in named.items() if each in ("room", "hallway")}
@@ -198,14 +200,26 @@ def _class_ratio(
     return statistics.mean(right) if right else None
 
 
-def _hallways(
-    rooms: RoomMap, classes: dict[int, str], overlap: Numbers, pairs: list[tuple[int, int]]
+def _hallways(rooms: RoomMap, classes: dict[int, str], overlap: Numbers) -> tuple[int, int, int]:
+    corridors = [region.room_class is RoomClass.CORRIDOR for region in rooms.regions]
+    return count_hallways(corridors, classes, overlap)
+
+
+def count_hallways(
+    is_corridor: Sequence[bool], classes: dict[int, str], overlap: Numbers
 ) -> tuple[int, int, int]:
+    """Count corridors that are hallways people drew, that are none, and hallways not found.
+
+    Args:
+        is_corridor: Of each region found.
+        classes: What the regions that people drew are.
+    """
     drawn = np.flatnonzero(overlap.any(axis=0)).tolist()
     n_true = sum(classes.get(number) == "hallway" for number in drawn)
     found = [i for i in np.flatnonzero(overlap[:, 1:].any(axis=1)).tolist() if i > 0]
-    n_found = sum(_is_hallway(rooms, i) for i in found)
-    n_right = sum(_is_hallway(rooms, i) and classes.get(j) == "hallway" for i, j in pairs)
+    n_found = sum(is_corridor[i - 1] for i in found)
+    pairs = np.argwhere(find_agreement(overlap) >= 0.5).tolist()
+    n_right = sum(is_corridor[i - 1] and classes.get(j) == "hallway" for i, j in pairs)
     return n_right, n_found - n_right, n_true - n_right
 
 

@@ -224,7 +224,7 @@ async def test_a_bay_that_may_be_part_of_a_room_is_named_apart_from_the_smallest
     async with connect(FakeRobot(grid, pose=Pose(1.5, 1.5)), tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
     assert "The smaller room is R2 (10.5 m2), the larger R1 (19.5 m2)." in text
-    assert "Maybe parts of others: R3 (3.3 m2)." in text
+    assert "Probably parts of others: R3 (3.3 m2)." in text
 
 
 async def test_a_corridor_that_bends_has_one_size_in_the_table_and_where_it_is_described(

@@ -138,3 +138,27 @@ def test_free_cells_may_have_any_value_up_to_49(labels: Labels) -> None:
     found = divide(np.where(cells == 0, noise, cells)).labels
 
     assert np.array_equal(found, labels)
+
+
+@pytest.mark.parametrize("angle_deg", [10.0, 27.0, 45.0])
+def test_walls_one_cell_thick_divide_rooms_at_any_angle(angle_deg: float) -> None:
+    cells = np.full((300, 300), -1, np.int8)
+    middle, turn = np.array([150.0, 150.0]), np.radians(angle_deg)
+    along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+
+    def corner(x: float, y: float) -> tuple[int, int]:
+        u, v = np.round(middle + x * along + y * across).astype(int).tolist()
+        return u, v
+
+    outline = np.array([corner(x, y) for x, y in ((-90, -50), (90, -50), (90, 50), (-90, 50))])
+    cv2.fillPoly(cells, [outline], (0,))
+    cv2.polylines(cells, [outline], isClosed=True, color=(100,))
+    cv2.line(cells, corner(0, -50), corner(0, 20), (100,))
+    cv2.line(cells, corner(0, 38), corner(0, 50), (100,))
+
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert [round(region.floor_area_m2) for region in rooms.regions] == pytest.approx(
+        [22, 22], abs=1
+    )
+    assert [door.width_m for door in rooms.doors] == pytest.approx([0.85], abs=0.15)

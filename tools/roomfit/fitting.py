@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.rooms.people import list_labelled_maps
 from mapspeak.spatial.rooms.joining import Judge, read_trees
 from tools.roomfit.labelled import LabelledMap, draw_maps, read_maps
-from tools.roomfit.samples import Samples, Task, prepare, unite
+from tools.roomfit.samples import Samples, Score, Task, prepare, unite
 from tools.roomfit.trees import fit_judge, fit_trees
 from tools.roomfit.variants import VARIANTS
 
@@ -89,7 +89,7 @@ def _weigh(parts: Sequence[Samples]) -> Samples:
     return unite([first, *lighter])
 
 
-def _score(path: Path, judge: Judge) -> list[float]:
+def _score(path: Path, judge: Judge) -> list[Score]:
     return [task.score(judge) for task in _read_tasks(path)]
 
 
@@ -102,18 +102,29 @@ def _deal(buildings: Sequence[str], n_parts: int) -> list[int]:
 
 
 def _print_scores(
-    title: str, maps: Sequence[LabelledMap], scores: Iterable[Sequence[float]]
+    title: str, maps: Sequence[LabelledMap], scores: Iterable[Sequence[Score]]
 ) -> None:
     kinds = ("as it is", *(vary.__name__ for vary in VARIANTS))
-    groups: dict[str, list[Sequence[float]]] = defaultdict(list)
+    groups: dict[str, list[Sequence[Score]]] = defaultdict(list)
     for labelled, own in zip(maps, scores, strict=True):
         groups[labelled.group].append(own)
-    sys.stdout.write(f"F1 at IoU 0.5, {title}: {', '.join(kinds)}\n")
+    sys.stdout.write(f"F1 at IoU 0.5, {title}: {', '.join(kinds)}; hallways as it is\n")
     sys.stdout.writelines(_rows(groups))
     sys.stdout.flush()
 
 
-def _rows(groups: dict[str, list[Sequence[float]]]) -> Iterator[str]:
-    for group, scores in groups.items():
-        means = " ".join(f"{statistics.mean(column):.3f}" for column in zip(*scores, strict=True))
-        yield f"  {group:20} {len(scores):3} maps  {means}\n"
+def _rows(groups: dict[str, list[Sequence[Score]]]) -> Iterator[str]:
+    for group, scores in [*groups.items(), ("all", list(chain.from_iterable(groups.values())))]:
+        means = " ".join(
+            f"{statistics.mean(each.f1 for each in column):.3f}"
+            for column in zip(*scores, strict=True)
+        )
+        yield f"  {group:20} {len(scores):3} maps  {means}  {_hallway_f1(scores)}\n"
+
+
+def _hallway_f1(scores: Sequence[Sequence[Score]]) -> str:
+    """Return F1 of hallways end to end, on the maps as they are."""
+    right, wrong, missed = (
+        sum(column) for column in zip(*(own[0].hallways for own in scores), strict=True)
+    )
+    return f"{2 * right / (2 * right + wrong + missed):.3f}" if right + missed else "-"

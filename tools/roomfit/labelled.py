@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.rooms.drawn import draw_worlds, number_spaces
+from benchmarks.rooms.people import read_classes
 from mapspeak.simulator import TrueFloor
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_picture
@@ -35,6 +36,7 @@ class LabelledMap:
         group: The set it belongs to.
         building: Maps of one building are fitted on together or left out together.
         truth: The number of the room of each cell of the grid; 0 where nobody said.
+        classes: "room" or "hallway" of the rooms of which people said it.
     """
 
     grid: OccupancyGrid
@@ -42,6 +44,7 @@ class LabelledMap:
     group: str
     name: str
     building: str
+    classes: dict[int, str] = field(default_factory=dict)
 
 
 def name_building(group: str, name: str) -> str:
@@ -52,15 +55,16 @@ def name_building(group: str, name: str) -> str:
 def read_maps(folders: Sequence[Path]) -> Iterator[LabelledMap]:
     """Read maps, each a folder with map.png, rooms.png and meta.json."""
     for folder in folders:
-        resolution_m = json.loads((folder / "meta.json").read_text())["resolution"]
+        meta = json.loads((folder / "meta.json").read_text())
         numbers = cv2.imread(str(folder / "rooms.png"), cv2.IMREAD_UNCHANGED)
         group = folder.parent.name
         yield LabelledMap(
-            grid=load_picture(folder / "map.png", resolution_m=resolution_m).grid,
+            grid=load_picture(folder / "map.png", resolution_m=meta["resolution"]).grid,
             truth=np.asarray(numbers, np.uint16)[::-1],
             group=group,
             name=folder.name,
             building=name_building(group, folder.name),
+            classes=read_classes(meta),
         )
 
 

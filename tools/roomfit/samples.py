@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.rooms.people import find_agreement, find_overlap
+from benchmarks.rooms.people import count_hallways, find_agreement, find_overlap
 from mapspeak.spatial.grid import FloatArray, IntArray
+from mapspeak.spatial.rooms import RoomClass
 from mapspeak.spatial.rooms.borders import MEASURES, PlaceGraph
 from mapspeak.spatial.rooms.finding import (
+    classify_all,
     find_openings,
     join_corridors,
-    labels_on_grid,
     measure_regions,
 )
 from mapspeak.spatial.rooms.floor import Floor, build_floor
@@ -57,6 +58,19 @@ def unite(parts: Sequence[Samples]) -> Samples:
         is_none=np.concatenate([part.is_none for part in parts]),
         weights=np.concatenate([part.weights for part in parts]),
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """How well a map was divided.
+
+    Attributes:
+        f1: Of regions that agree with a room.
+        hallways: Right, wrong and missed, of those whose class people gave.
+    """
+
+    f1: float
+    hallways: tuple[int, int, int]
 
 
 class KnownGraph(PlaceGraph):
@@ -118,19 +132,31 @@ class Task:
             weights=importance / np.sqrt(max(len(is_none), 1)),
         )
 
-    def score(self, judge: Judge) -> float:
-        """Return F1 of rooms at an intersection over union of 0.5."""
+    def score(self, judge: Judge) -> Score:
+        """Return how well rooms agree at an intersection over union of 0.5."""
         graph = copy.deepcopy(self.graph)
         join_places(graph, judge)
         places = fill_cuts(number_by_area(graph)[self.basins], self.cut)
         rooms = Segmentation(raster=self.raster, floor=self.floor, labels=places, doubts={})
         rooms = join_corridors(rooms, measure_regions(rooms), find_openings(rooms))
-        found = labels_on_grid(self.raster, rooms.labels).astype(np.intp)
+        found = self.raster.on_grid(rooms.labels).astype(np.intp)
         truth = self.labelled.truth.astype(np.intp)
         overlap = find_overlap(found, truth, self.labelled.grid.free & (truth > 0))
         n_found, n_true = ((overlap.sum(axis=axis)[1:] > 0).sum() for axis in (1, 0))
         n_right = (find_agreement(overlap) >= 0.5).sum()
-        return float(2 * n_right / max(n_found + n_true, 1))
+        classes = classify_all(measure_regions(rooms), find_openings(rooms))
+        return Score(
+            f1=float(2 * n_right / max(n_found + n_true, 1)),
+            hallways=self._count_hallways(classes, overlap),
+        )
+
+    def _count_hallways(
+        self, classes: Sequence[RoomClass], overlap: NDArray[np.intp]
+    ) -> tuple[int, int, int]:
+        if not self.labelled.classes:
+            return 0, 0, 0
+        corridors = [each is RoomClass.CORRIDOR for each in classes]
+        return count_hallways(corridors, self.labelled.classes, overlap)
 
 
 def prepare(labelled: LabelledMap) -> Task:
@@ -153,9 +179,4 @@ def prepare(labelled: LabelledMap) -> Task:
 
 def _truth_on(raster: Raster, labelled: LabelledMap) -> NDArray[np.intp]:
     truth = np.where(labelled.grid.free[: len(labelled.truth)], labelled.truth, 0)
-    starts = raster.first_row, raster.first_col
-    rows, cols = (
-        np.clip((start + (np.arange(n) + 0.5) / raster.scale).astype(np.intp), 0, most - 1)
-        for start, n, most in zip(starts, raster.free.shape, truth.shape, strict=True)
-    )
-    return truth[np.ix_(rows, cols)].astype(np.intp)
+    return raster.of_grid(truth.astype(np.int16)).astype(np.intp)

@@ -20,6 +20,7 @@ from mapspeak.server.text.maps import (
     say_map_warning,
     say_ranks,
     say_size,
+    say_unsure,
 )
 from mapspeak.spatial.areagraph import MapAnchor, build_area_graph
 from mapspeak.spatial.coverage import measure_known_area
@@ -222,12 +223,14 @@ def _say_sizes(rooms: RoomMap, by_size: list[Region]) -> list[str]:
     doubtful = {room.id: door for room in named if (door := rooms.find_doubtful_door(room))}
     sure = [f"{r.id} ({r.floor_area_m2:.1f} m2)" for r in named if r.id not in doubtful]
     unsure = [
-        f"{room.id} ({room.floor_area_m2:.1f} m2, {say_doubtful_door(room, doubtful[room.id])})"
-        for room in named
-        if room.id in doubtful
+        (
+            f"{r.id} ({r.floor_area_m2:.1f} m2, {say_doubtful_door(r, doubtful[r.id])})",
+            doubtful[r.id],
+        )
+        for r in named
+        if r.id in doubtful
     ]
-    ranks = say_ranks(sure, is_of_all=True, has_unsure=bool(unsure))
-    return [ranks, f"Unsure: {', '.join(unsure)}."] if unsure else [ranks]
+    return [say_ranks(sure, is_of_all=True, has_unsure=bool(unsure)), *say_unsure(unsure)]
 
 
 def _find_ways(job: MapJob, loaded: LoadedMap, regions: list[Region]) -> dict[str, str]:

@@ -81,7 +81,20 @@ def say_ranks(names: Sequence[str], *, is_of_all: bool, has_unsure: bool, so_far
 def say_doubtful_door(region: Region, door: Door) -> str:
     """Say what a region may be part of."""
     one, other = door.region_ids
-    return f"maybe part of {other if one == region.id else one}: {door.id}"
+    share = "maybe" if door.is_likely else "probably"
+    return f"{share} part of {other if one == region.id else one}: {door.id}"
+
+
+def say_unsure(sized: Sequence[tuple[str, Door]]) -> list[str]:
+    """Say which rooms may be parts of others, and apart, which probably are.
+
+    Args:
+        sized: The rooms in words, each with its doubtful door.
+    """
+    maybe = [words for words, door in sized if door.is_likely]
+    probably = [words for words, door in sized if not door.is_likely]
+    titled = (("Maybe parts of others", maybe), ("Probably parts of others", probably))
+    return [f"{title}: {', '.join(words)}." for title, words in titled if words]
 
 
 MOST_SIGNS = 59

@@ -19,6 +19,7 @@ from mapspeak.server.text.maps import (
     say_merits,
     say_ranks,
     say_refusal,
+    say_unsure,
     say_verdict,
 )
 from mapspeak.server.text.told import PICTURE, WAY, Told, tell_rows
@@ -272,17 +273,17 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     rooms = _rooms_by_size(regions)
     is_of_all = len(rooms) == len(_rooms_by_size(world.rooms.regions))
     so_far = " so far" if world.may_hide_rooms else ""
-    unsure = [room for room in rooms if world.rooms.find_doubtful_door(room)]
-    sure = [room for room in rooms if room not in unsure]
+    doors = [world.rooms.find_doubtful_door(room) for room in rooms]
+    sure = [room for room, door in zip(rooms, doors, strict=True) if door is None]
+    unsure = [
+        (_say_size(world, room), door) for room, door in zip(rooms, doors, strict=True) if door
+    ]
     names = [_say_size(world, room) for room in sure]
     lines = [say_ranks(names, is_of_all=is_of_all, has_unsure=bool(unsure), so_far=so_far)]
     for smallest, second in list(pairwise(sure))[:1]:
         if smallest.floor_area_m2 + world.growth_m2.get(smallest.id, 0) > second.floor_area_m2:
             lines.append(f"{smallest.id} may turn out larger than {second.id}.")
-    if unsure:
-        named = ", ".join(_say_size(world, room) for room in unsure)
-        lines.append(f"Maybe parts of others: {named}.")
-    return " ".join(lines)
+    return " ".join([*lines, *say_unsure(unsure)])
 
 
 def say_walk(region: Region, walk: CorridorWalk) -> str:

@@ -1,6 +1,7 @@
 """Rooms, corridors and doors found on an occupancy grid."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -12,8 +13,8 @@ from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask, OccupancyGrid, Window
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
-from mapspeak.spatial.rooms.raster import Raster, build_raster, find_cells
-from mapspeak.spatial.rooms.room_map import LETTER, Door, Labels, Region, RoomClass, RoomMap
+from mapspeak.spatial.rooms.raster import SETTINGS, Raster, build_raster, find_cells
+from mapspeak.spatial.rooms.room_map import LETTER, Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
 STRIP = 3.0
@@ -41,11 +42,13 @@ class RegionShape:
     Attributes:
         open_clearance_m: The largest clearance if what stands free in the region were gone.
         mean_clearance_m: The mean distance of its floor from the nearest wall.
+        is_half_seen: Some of its outline borders on what has not been seen.
     """
 
     region: Region
     open_clearance_m: float
     mean_clearance_m: float
+    is_half_seen: bool
 
     @property
     def elongation(self) -> float:
@@ -96,7 +99,7 @@ def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionSh
         floor_area_m2=int(inside.sum()) * raster.cell_area_m2,
         length_m=length * raster.cell_size_m,
         width_m=width * raster.cell_size_m,
-        heading_rad=(heading + raster.grid.origin.yaw_rad) % math.pi,
+        heading_rad=(heading - raster.turn_rad + raster.grid.origin.yaw_rad) % math.pi,
         widest=raster.point_at(window[0].start + row + 0.5, window[1].start + col + 0.5),
         clearance_m=float(clearance[row, col]),
     )
@@ -104,7 +107,20 @@ def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionSh
         region=region,
         open_clearance_m=max(clearance[row, col], _open_clearance(inside) * raster.cell_size_m),
         mean_clearance_m=float(clearance[inside].mean()),
+        is_half_seen=_unseen_share(raster, inside, window) >= SETTINGS.half_seen_share,
     )
+
+
+def _unseen_share(raster: Raster, inside: Mask, window: Window) -> float:
+    """Return how much of the outline of a region borders on what has not been seen."""
+    region = np.pad(inside.astype(np.uint8), 1)
+    outline = (cv2.dilate(region, np.ones((3, 3), np.uint8)) > 0) & (region == 0)
+    rows, cols = (slice(max(part.start - 1, 0), part.stop + 1) for part in window)
+    seen = np.zeros(region.shape, np.uint8)
+    part = raster.free[rows, cols] | raster.occupied[rows, cols]
+    top, left = (int(side.start == 0) for side in window)
+    seen[top : top + part.shape[0], left : left + part.shape[1]] = part
+    return float((seen[outline] == 0).mean())
 
 
 def _open_clearance(inside: Mask) -> float:
@@ -134,9 +150,16 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
     return one + 1, other + 1, math.radians(angle_deg)
 
 
-def classify(shape: RegionShape, *, n_neighbours: int) -> RoomClass:
-    """Return what a person would call a region."""
-    leads_on = shape.is_strip or any(
+def classify(shape: RegionShape, *, n_neighbours: int, exits_m: Sequence[float]) -> RoomClass:
+    """Return what a person would call a region.
+
+    Args:
+        exits_m: The widths of the ways out of it.
+    """
+    # Closets and stairs are strips behind one door that is narrower than they are.
+    is_closet = len(exits_m) == 1 and exits_m[0] < RUN_ON_RATIO * walked_size(shape)[1]
+    is_way = shape.is_strip and (shape.is_half_seen or not is_closet)
+    leads_on = is_way or any(
         shape.elongation > elongation and n_neighbours >= least
         for elongation, least in CORRIDOR_LADDER
     )
@@ -256,7 +279,7 @@ def find_rooms(
     if joined is not segmentation:
         segmentation = joined
         shapes, openings = measure_regions(segmentation), find_openings(segmentation)
-    labels = labels_on_grid(raster, segmentation.labels)
+    labels = raster.on_grid(segmentation.labels)
     regions, doors = _name(shapes, openings)
     current = RoomMap(grid=grid, labels=labels, regions=regions, doors=doors)
     return current if previous is None else match_rooms(previous, current)
@@ -266,7 +289,7 @@ def join_corridors(
     segmentation: Segmentation, shapes: list[RegionShape], openings: list[Opening]
 ) -> Segmentation:
     """Make corridors that run on into one another, round a bend or past pillars, one."""
-    classes = _classify_all(shapes, openings)
+    classes = classify_all(shapes, openings)
     number = np.arange(len(shapes) + 1)
     for opening in openings:
         one, other = opening.first - 1, opening.second - 1
@@ -290,14 +313,17 @@ def join_corridors(
     return replace(segmentation, labels=rank[labels], doubts=doubts)
 
 
-def _classify_all(shapes: list[RegionShape], openings: list[Opening]) -> list[RoomClass]:
+def classify_all(shapes: list[RegionShape], openings: list[Opening]) -> list[RoomClass]:
+    """Return what a person would call each region."""
     behind: list[set[int]] = [set() for _ in shapes]
+    exits_m: list[list[float]] = [[] for _ in shapes]
     for opening in openings:
-        behind[opening.first - 1].add(opening.second)
-        behind[opening.second - 1].add(opening.first)
+        for one, other in permutations((opening.first - 1, opening.second - 1)):
+            behind[one].add(other + 1)
+            exits_m[one].append(opening.width_m)
     return [
-        classify(shape, n_neighbours=len(others))
-        for shape, others in zip(shapes, behind, strict=True)
+        classify(shape, n_neighbours=len(others), exits_m=widths_m)
+        for shape, others, widths_m in zip(shapes, behind, exits_m, strict=True)
     ]
 
 
@@ -311,7 +337,7 @@ def _name(
         for one, other in permutations((opening.first - 1, opening.second - 1)):
             behind[one].add(other)
             door_ids[one].append(f"D{number}")
-    classes = _classify_all(shapes, openings)
+    classes = classify_all(shapes, openings)
     ids = [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
     regions = []
     for index, (shape, room_class) in enumerate(zip(shapes, classes, strict=True)):
@@ -337,16 +363,3 @@ def _name(
         for number, opening in enumerate(openings, start=1)
     )
     return tuple(regions), doors
-
-
-def labels_on_grid(raster: Raster, labels: NDArray[np.int32]) -> Labels:
-    """Take raster labels to the cells of the grid."""
-    grid = raster.grid
-    full = np.zeros(grid.cells.shape, np.int16)
-    if labels.size == 0:
-        return full
-    high, wide = (round(side / raster.scale) for side in labels.shape)
-    window = cv2.resize(labels.astype(np.int16), (wide, high), interpolation=cv2.INTER_NEAREST)
-    part = full[raster.first_row :, raster.first_col :][:high, :wide]
-    part[:] = window[: part.shape[0], : part.shape[1]]
-    return full

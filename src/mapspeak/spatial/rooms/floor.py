@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.paths.lattice import measure_away
+from mapspeak.spatial.rooms.directions import find_wall_directions
 from mapspeak.spatial.rooms.furniture import find_blocks
 from mapspeak.spatial.rooms.raster import SETTINGS, Picture, Raster, drop_specks, find_cells
 
@@ -38,9 +39,9 @@ class Floor:
 
 def build_floor(raster: Raster) -> Floor:
     """Return the floor with its furniture cleared away."""
-    directions = find_wall_directions(raster.occupied, least_ratio=SETTINGS.direction_ratio)
+    directions = find_wall_directions(raster.occupied)
     wall, obstacle = find_walls(raster, directions)
-    block, behind = find_blocks(raster, wall, directions[0] if directions else 0.0)
+    block, behind = find_blocks(raster, wall)
     wall, obstacle = (part & (1 - block) | behind for part in (wall, obstacle))
     free = raster.free | block
     occupied = (raster.occupied & (1 - block)) | behind
@@ -97,14 +98,9 @@ _NEIGHBOURS = (
 """The cells that have a neighbour below, above, right and left; and those neighbours."""
 
 
-MAX_DIRECTIONS = 8
 OBLIQUE_STEP_DEG = 7.5
 SLENDER_RATIO = 0.37
 """Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
-_EDGE_BLUR_CELLS = 1.5
-_BELL_DEG = 2.0
-_APART_DEG = 6
-"""Main directions differ by more than this."""
 
 
 def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Picture]:
@@ -171,41 +167,3 @@ def _sort_obstacles(free: Picture, largest_island: float) -> tuple[Picture, Pict
     is_slender = stats[:, cv2.CC_STAT_AREA] <= SLENDER_RATIO * across**2
     is_large[0] = is_slender[0] = False
     return is_large.astype(np.uint8)[label], is_slender.astype(np.uint8)[label]
-
-
-def find_wall_directions(occupied: Picture, *, least_ratio: float) -> list[float]:
-    """Return the main directions of walls in degrees from 0 to 90, the strongest first.
-
-    They are the peaks of the histogram of gradient angles modulo 90 degrees, each with at least
-    `least_ratio` of the highest; and last, halfway between the strongest and its right angle, the
-    direction of cut corners, which would else be found or not as the raster happens to lie.
-    """
-    histogram = _angle_histogram(occupied)
-    highest = float(histogram.max())
-    if highest <= 0:
-        return []
-    around = np.stack(
-        [np.roll(histogram, shift) for shift in range(-_APART_DEG, _APART_DEG + 1)]
-    ).max(axis=0)
-    peaks = np.flatnonzero((histogram >= around) & (histogram >= least_ratio * highest))
-    strongest = sorted(peaks.tolist(), key=lambda peak: (-histogram[peak], peak))
-    directions = [peak + 0.5 for peak in strongest[:MAX_DIRECTIONS]]
-    halfway = (directions[0] + 45.0) % 90.0
-    is_new = all(abs((halfway - other + 45.0) % 90.0 - 45.0) > _APART_DEG for other in directions)
-    return [*directions, halfway] if is_new else directions
-
-
-def _angle_histogram(occupied: Picture) -> NDArray[np.float64]:
-    soft = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), _EDGE_BLUR_CELLS)
-    across = cv2.Sobel(soft, cv2.CV_32F, 1, 0)
-    along = cv2.Sobel(soft, cv2.CV_32F, 0, 1)
-    strength, angle = cv2.cartToPolar(across, along, angleInDegrees=True)
-    strong = strength > 0.3 * strength.max()
-    counts = np.bincount(
-        angle[strong].astype(np.intp) % 90,
-        weights=strength[strong].astype(np.float64),
-        minlength=90,
-    )
-    bell = np.exp(-0.5 * (np.arange(-8, 9) / _BELL_DEG) ** 2)
-    wrapped = np.concatenate([counts[-8:], counts, counts[:8]])
-    return np.convolve(wrapped, bell / bell.sum(), mode="valid")

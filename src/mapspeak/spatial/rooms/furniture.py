@@ -25,8 +25,6 @@ from mapspeak.spatial.rooms.raster import (
     put_lines,
     run_lengths,
     take_lines,
-    turn_back,
-    turn_upright,
     widen,
 )
 
@@ -47,18 +45,14 @@ Counts = NDArray[np.intp]
 Numbers = NDArray[np.int32]
 
 
-def find_blocks(raster: Raster, wall: Picture, angle_deg: float) -> tuple[Picture, Picture]:
+def find_blocks(raster: Raster, wall: Picture) -> tuple[Picture, Picture]:
     """Return 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
         wall: 1 on what was taken for wall; nothing else runs on behind furniture.
-        angle_deg: The direction of its walls.
     """
-    free, occupied, wall = turn_upright(raster.free, raster.occupied, wall, angle_deg)
-    solid = 1 - drop_specks(free, _SPECK_M2 / raster.cell_area_m2)
-    found = _find_blocks(solid, occupied, wall, _Sizes(solid, raster.cell_size_m))
-    shape = raster.free.shape[0], raster.free.shape[1]
-    block, behind = (turn_back(picture, shape, angle_deg) for picture in found)
+    solid = 1 - drop_specks(raster.free, _SPECK_M2 / raster.cell_area_m2)
+    block, behind = _find_blocks(solid, raster.occupied, wall, _Sizes(solid, raster.cell_size_m))
     return block, behind & (1 - block)
 
 

@@ -1,10 +1,9 @@
 """The raster on which rooms are found: cropped to the known, near one cell size for every map.
 
-Furniture is told from walls on pictures of it along whose rows and columns the walls run.
+It is turned where the walls do not run along the rows and columns of the map.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, FloatArray, OccupancyGrid
+from mapspeak.spatial.rooms.directions import find_main_direction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,6 @@ class RoomSettings:
         block_thickness_m: One of its sides is at most so long.
         block_length_m: The floor around it is at most this far, along the walls and square to
             them.
-        direction_ratio: A main direction has at least this share of the strongest one's edges.
         pocket_area_m2: Unseen areas up to this size inside a room count as floor.
         smoothing_m: Standard deviation of the smoothing of clearances.
         door_width_m: The widest opening between wall ends that is looked at as a door.
@@ -58,7 +57,6 @@ class RoomSettings:
     block_ratio: float = 2.0
     block_thickness_m: float = 1.3
     block_length_m: float = 3.0
-    direction_ratio: float = 0.2
     pocket_area_m2: float = 2.0
     smoothing_m: float = 0.1
     door_width_m: float = 3.5
@@ -75,6 +73,18 @@ class RoomSettings:
 SETTINGS = RoomSettings()
 
 Picture = NDArray[np.uint8]
+Numbers = NDArray[np.int16] | NDArray[np.int32]
+Places = NDArray[np.intp]
+Truths = NDArray[np.bool_]
+Affine = NDArray[np.float64]
+
+UPRIGHT_DEG = 0.6
+"""Walls that near to the rows and columns of the map need no turn."""
+_LEAST_COVER, _HALF_COVER = 64, 128
+"""Of 255: a turned cell is occupied, or free, where the map's cells cover it so much.
+
+With more, an oblique wall one cell thick would break.
+"""
 
 MAX_GRID_CELLS = 120_000_000
 MAX_RASTER_CELLS = 5_000_000
@@ -83,22 +93,19 @@ MAX_UPSCALING = 4
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Raster:
-    """The known part of a map at a working resolution.
+    """The known part of a map at a working resolution, turned so that its walls are upright.
 
     Attributes:
         free: 1 where a robot can be, else 0.
         occupied: 1 where something stands, else 0.
         cell_size_m: The side of one raster cell.
-        first_row: The row of the grid at which the raster begins.
-        scale: Raster cells per grid cell along one side; below 1 when the raster is coarser.
+        there: From (col, row) of the grid to that of the raster; a cell's centre lies at +0.5.
     """
 
     free: Picture
     occupied: Picture
     cell_size_m: float
-    first_row: int
-    first_col: int
-    scale: float
+    there: Affine
     grid: OccupancyGrid
 
     @property
@@ -106,12 +113,33 @@ class Raster:
         """The area of one raster cell."""
         return self.cell_size_m**2
 
+    @property
+    def turn_rad(self) -> float:
+        """How far the raster is turned against the grid."""
+        return math.atan2(self.there[1, 0], self.there[0, 0])
+
     def point_at(self, row: float, col: float) -> Point:
         """Return the place of a point of the raster; a cell's centre lies at +0.5, +0.5."""
-        rows = np.array([self.first_row + row / self.scale - 0.5])
-        cols = np.array([self.first_col + col / self.scale - 0.5])
-        xy: FloatArray = self.grid.points_at(rows, cols)
+        across, along = cv2.invertAffineTransform(self.there) @ (col, row, 1.0)
+        xy: FloatArray = self.grid.points_at(np.array([along - 0.5]), np.array([across - 0.5]))
         return Point(float(xy[0, 0]), float(xy[0, 1]))
+
+    def on_grid(self, numbers: NDArray[np.int32]) -> NDArray[np.int16]:
+        """Return the number of each cell of the grid, 0 outside of the raster."""
+        return _sample(numbers, _between_centres(self.there), self.grid.cells.shape)
+
+    def of_grid(self, numbers: NDArray[np.int16]) -> NDArray[np.int16]:
+        """Return the number of the grid's cell that each cell of the raster lies in."""
+        there = _between_centres(np.asarray(cv2.invertAffineTransform(self.there), np.float64))
+        return _sample(numbers, there, self.free.shape)
+
+
+def _sample(numbers: Numbers, there: Affine, shape: tuple[int, ...]) -> NDArray[np.int16]:
+    """Return the numbers at the cells of a picture of this shape, 0 outside."""
+    if 0 in shape:
+        return np.zeros(shape, np.int16)
+    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(numbers.astype(np.int16), there, shape[::-1], flags=flags))
 
 
 def find_cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -122,7 +150,7 @@ def find_cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.in
 
 
 def build_raster(grid: OccupancyGrid) -> Raster:
-    """Return the known part of a map in cells of about the size set.
+    """Return the known part of a map in cells of about the size set, its walls upright.
 
     Raises:
         MapError: The map has more cells than can be handled.
@@ -138,18 +166,63 @@ def build_raster(grid: OccupancyGrid) -> Raster:
     shrink, grow = _factors(known.size, grid.resolution_m)
     if known.size == 0:
         known = np.full((1, 1), UNKNOWN, np.int8)
-    free = _resize((known >= 0) & (known <= FREE_MAX), shrink=shrink, grow=grow, full=True)
-    occupied = _resize(known > FREE_MAX, shrink=shrink, grow=grow, full=False)
-    free &= 1 - occupied
+    cell_size_m = grid.resolution_m * shrink / grow
+    free, occupied = (
+        np.asarray(mask, np.uint8)
+        for mask in ((known >= 0) & (known <= FREE_MAX), known > FREE_MAX)
+    )
+    there = _shift(cols.start, rows.start)
+    off_deg = find_main_direction(_resize(occupied, shrink=shrink, grow=grow, full=False))
+    if abs(off_deg) > UPRIGHT_DEG:
+        # Turned as fine as it is, so that walls one cell thick stay whole.
+        turn, size = _find_turn(known.shape, off_deg, grow)
+        free = _turn(free, turn, size, _HALF_COVER)
+        occupied = _turn(occupied, turn, size, _LEAST_COVER)
+        used = (free | occupied) > 0
+        rows, cols = _extent(np.any(used, axis=1)), _extent(np.any(used, axis=0))
+        free, occupied = free[rows, cols], occupied[rows, cols]
+        there, grow = _shift(cols.start, rows.start) @ turn @ there, 1
+    free = _resize(free, shrink=shrink, grow=grow, full=True)
+    occupied = _resize(occupied, shrink=shrink, grow=grow, full=False)
     return Raster(
-        free=free,
+        free=free & (1 - occupied),
         occupied=occupied,
-        cell_size_m=grid.resolution_m * shrink / grow,
-        first_row=rows.start,
-        first_col=cols.start,
-        scale=grow / shrink,
+        cell_size_m=cell_size_m,
+        there=(np.diag([grow / shrink, grow / shrink, 1.0]) @ there)[:2],
         grid=grid,
     )
+
+
+def _shift(col: int, row: int) -> Affine:
+    """Return the way to a picture that begins at that column and row."""
+    return np.array([[1.0, 0.0, -col], [0.0, 1.0, -row], [0.0, 0.0, 1.0]])
+
+
+def _find_turn(
+    shape: tuple[int, ...], angle_deg: float, scale: int
+) -> tuple[Affine, tuple[int, int]]:
+    """Return the way to a picture on which walls of this direction are upright, and its size."""
+    high, wide = shape
+    cosine, sine = (scale * part(math.radians(angle_deg)) for part in (math.cos, math.sin))
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    corners = np.array([[0, 0, 1], [wide, 0, 1], [0, high, 1], [wide, high, 1]]) @ turn.T
+    turn[:2, 2] = -corners.min(axis=0)[:2]
+    across, along = np.ceil(np.ptp(corners, axis=0)[:2]).astype(int).tolist()
+    return turn, (across, along)
+
+
+def _turn(part: Picture, turn: Affine, size: tuple[int, int], least: int) -> Picture:
+    """Return a picture turned; a cell is set that is covered so much, of 255."""
+    there = _between_centres(turn)
+    cover = cv2.warpAffine(part * np.uint8(255), there, size, flags=cv2.INTER_LINEAR)
+    return (np.asarray(cover) >= least).astype(np.uint8)
+
+
+def _between_centres(there: Affine) -> Affine:
+    """Return a way between pictures as OpenCV has it, with (0, 0) in the middle of a cell."""
+    moved = there[:2].copy()
+    moved[:, 2] += there[:2, :2] @ (0.5, 0.5) - 0.5
+    return moved
 
 
 def _extent(used: NDArray[np.bool_]) -> slice:
@@ -168,9 +241,8 @@ def _factors(n_cells: int, resolution_m: float) -> tuple[int, int]:
     return (shrink, 1) if shrink > 1 else (1, grow)
 
 
-def _resize(mask: NDArray[np.bool_], *, shrink: int, grow: int, full: bool) -> Picture:
-    """Resize a mask; a shrunk cell is set when any of its cells is, or for `full` half of them."""
-    picture = mask.astype(np.uint8)
+def _resize(picture: Picture, *, shrink: int, grow: int, full: bool) -> Picture:
+    """Resize a picture; a shrunk cell is set when any, or for `full` half, of its cells are."""
     if grow > 1:
         return np.repeat(np.repeat(picture, grow, axis=0), grow, axis=1)
     if shrink == 1:
@@ -180,63 +252,6 @@ def _resize(mask: NDArray[np.bool_], *, shrink: int, grow: int, full: bool) -> P
     padded[: picture.shape[0], : picture.shape[1]] = picture
     share = cv2.resize(padded * np.uint8(255), (wide, high), interpolation=cv2.INTER_AREA)
     return (share >= (127 if full else 1)).astype(np.uint8)
-
-
-Numbers = NDArray[np.int16] | NDArray[np.int32]
-Places = NDArray[np.intp]
-Truths = NDArray[np.bool_]
-Affine = NDArray[np.float64]
-
-_UPRIGHT_DEG = 0.6
-
-
-def turn_upright(
-    free: Picture, occupied: Picture, wall: Picture, angle_deg: float
-) -> tuple[Picture, ...]:
-    """Return all three so turned that walls of this direction run along rows and columns."""
-    if is_upright(angle_deg):
-        return free, occupied, wall
-    there, size = _find_turn(free.shape, angle_deg)
-    floor, solid, closed_wall = turn_closed((free, occupied, wall), there, size)
-    return floor & (1 - solid), solid, closed_wall
-
-
-def turn_closed(pictures: Sequence[Picture], there: Affine, size: Sequence[int]) -> list[Picture]:
-    """Return pictures turned; what is solid, all but the first, falls apart so, and is closed."""
-    turned = [
-        np.asarray(cv2.warpAffine(part, there, size, flags=cv2.INTER_NEAREST), np.uint8)
-        for part in pictures
-    ]
-    square = np.ones((3, 3), np.uint8)
-    closed = [
-        np.asarray(cv2.morphologyEx(part, cv2.MORPH_CLOSE, square), np.uint8) for part in turned[1:]
-    ]
-    return [turned[0], *closed]
-
-
-def turn_back(picture: Picture, shape: tuple[int, int], angle_deg: float) -> Picture:
-    """Return a picture that was found on turned ones as it lies on those of this shape."""
-    if is_upright(angle_deg):
-        return picture
-    there, _ = _find_turn(shape, angle_deg)
-    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-    return np.asarray(cv2.warpAffine(picture, there, shape[::-1], flags=flags), np.uint8)
-
-
-def is_upright(angle_deg: float) -> bool:
-    """Return True for walls so near to rows and columns that a map need not be turned."""
-    return abs((angle_deg + 45.0) % 90.0 - 45.0) <= _UPRIGHT_DEG
-
-
-def _find_turn(shape: tuple[int, ...], angle_deg: float) -> tuple[Affine, tuple[int, int]]:
-    high, wide = shape
-    middle = (wide / 2, high / 2)
-    there = np.asarray(cv2.getRotationMatrix2D(middle, angle_deg, 1.0), np.float64)
-    radians = math.radians(angle_deg)
-    cosine, sine = abs(math.cos(radians)), abs(math.sin(radians))
-    across, along = math.ceil(wide * cosine + high * sine), math.ceil(wide * sine + high * cosine)
-    there[:, 2] += np.array([(across - wide) / 2, (along - high) / 2])
-    return there, (across, along)
 
 
 def open_box(picture: Picture, high: int, wide: int) -> Picture:

@@ -34,8 +34,6 @@ from mapspeak.spatial.rooms.raster import (
     Raster,
     Truths,
     find_cells,
-    is_upright,
-    turn_closed,
 )
 
 _APART_M = 0.4
@@ -73,41 +71,23 @@ class Doorway:
 
 
 def find_doorways(raster: Raster, floor: Floor) -> list[Doorway]:
-    """Return the wide openings in line with the strongest walls, or at right angles to them.
+    """Return the wide openings in line with walls along the rows, or the columns.
 
     One jamb is the end of something thin that runs on in line; the other is such an end too, or
     the corner of a wall.
     """
-    if not floor.directions_deg:
-        return []
     jamb = floor.wall | floor.obstacle
-    pictures = [jamb, floor.wall, floor.solid, floor.floor & (1 - jamb)]
     margin = round(max(SETTINGS.stub_m, SETTINGS.tip_m) / raster.cell_size_m) + 2
-    turned, back = _turn(pictures, floor.directions_deg[0], margin)
-    sideways = [np.asarray(cv2.transpose(picture), np.uint8) for picture in turned]
-    rows = _find_along_rows(turned, back, raster)
+    pictures = [
+        np.pad(picture, margin)
+        for picture in (jamb, floor.wall, floor.solid, floor.floor & (1 - jamb))
+    ]
+    sideways = [np.asarray(cv2.transpose(picture), np.uint8) for picture in pictures]
+    back = np.array([[1.0, 0.0, -margin], [0.0, 1.0, -margin]])
+    rows = _find_along_rows(pictures, back, raster)
     cols = _find_along_rows(sideways, back[:, [1, 0, 2]], raster)
     reach = _SHARED_M / raster.cell_size_m
     return _leave_out_crossing(rows, cols, reach) + _leave_out_crossing(cols, rows, reach)
-
-
-def _turn(pictures: list[Picture], angle_deg: float, margin: int) -> tuple[list[Picture], Affine]:
-    """Return pictures whose walls run along rows and columns, and the way back from them.
-
-    Around them is a margin of what is neither jamb nor floor.
-    """
-    if is_upright(angle_deg):
-        framed = [np.pad(picture, margin) for picture in pictures]
-        return framed, np.array([[1.0, 0.0, -margin], [0.0, 1.0, -margin]])
-    high, wide = pictures[0].shape
-    there = cv2.getRotationMatrix2D((wide / 2, high / 2), angle_deg, 1.0)
-    corners = np.array([[0, 0, 1], [wide, 0, 1], [0, high, 1], [wide, high, 1]]) @ there.T
-    there[:, 2] += margin - corners.min(axis=0)
-    size = (np.ptp(corners, axis=0) + 2 * margin + 1).astype(int).tolist()
-    *solids, last = pictures
-    turned, *closed = turn_closed([last, *solids], np.asarray(there, np.float64), size)
-    back = np.asarray(cv2.invertAffineTransform(there), np.float64)
-    return [*closed, turned & (1 - closed[0])], back
 
 
 def _find_along_rows(pictures: list[Picture], back: Affine, raster: Raster) -> list[Doorway]:

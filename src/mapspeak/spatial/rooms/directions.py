@@ -1,0 +1,88 @@
+"""The directions of walls, modulo a right angle."""
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.grid import FloatArray, IntArray
+
+MAX_DIRECTIONS = 8
+_LEAST_RATIO = 0.2
+"""A main direction has at least this share of the strongest one's edges."""
+_EDGE_BLUR_CELLS = 1.5
+_BELL_DEG = 2.0
+_APART_DEG = 6
+"""Main directions differ by more than this."""
+_NEAR_DEG, _STEP_DEG = 4.0, 0.25
+_MOST_CELLS = 20_000
+
+
+def find_main_direction(occupied: NDArray[np.uint8]) -> float:
+    """Return how far the strongest direction of walls is off the axes, from -45 to 45 degrees.
+
+    Of the angles near the peak of gradients, which steps in an oblique wall draw aside, the one
+    counts at which obstacles fall into the fewest rows and columns.
+    """
+    directions = find_wall_directions(occupied)
+    if not directions:
+        return 0.0
+    cells = np.flatnonzero(occupied)
+    rows, cols = np.divmod(cells[:: cells.size // _MOST_CELLS + 1], occupied.shape[1])
+    angles_deg = directions[0] + np.arange(-_NEAR_DEG, _NEAR_DEG, _STEP_DEG)
+    off_deg = (angles_deg + 45.0) % 90.0 - 45.0
+    # On small maps several are equally good: then the one nearest to the axes.
+    off_deg = off_deg[np.argsort(np.abs(off_deg), kind="stable")]
+    fullness = [_fullness(rows, cols, math.radians(angle_deg)) for angle_deg in off_deg]
+    return float(off_deg[int(np.argmax(fullness))])
+
+
+def _fullness(rows: IntArray, cols: IntArray, angle_rad: float) -> float:
+    """Return the sum of squares of how many cells fall into each row and each column."""
+    cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
+    sums = 0.0
+    for places in (cosine * cols + sine * rows, cosine * rows - sine * cols):
+        counts = np.bincount((places - places.min()).astype(np.intp)).astype(np.float64)
+        sums += float(counts @ counts)
+    return sums
+
+
+def find_wall_directions(occupied: NDArray[np.uint8]) -> list[float]:
+    """Return the main directions of walls in degrees from 0 to 90, the strongest first.
+
+    They are the peaks of the histogram of gradient angles modulo 90 degrees, each with at least
+    a fifth of the highest; and last, halfway between the strongest and its right angle, the
+    direction of cut corners, which would else be found or not as the raster happens to lie.
+    """
+    histogram = _angle_histogram(occupied)
+    highest = float(histogram.max())
+    if highest <= 0:
+        return []
+    around = np.stack(
+        [np.roll(histogram, shift) for shift in range(-_APART_DEG, _APART_DEG + 1)]
+    ).max(axis=0)
+    peaks = np.flatnonzero((histogram >= around) & (histogram >= _LEAST_RATIO * highest))
+    strongest = sorted(peaks.tolist(), key=lambda peak: (-histogram[peak], peak))
+    directions = [peak + 0.5 for peak in strongest[:MAX_DIRECTIONS]]
+    halfway = (directions[0] + 45.0) % 90.0
+    is_new = all(abs((halfway - other + 45.0) % 90.0 - 45.0) > _APART_DEG for other in directions)
+    return [*directions, halfway] if is_new else directions
+
+
+def _angle_histogram(occupied: NDArray[np.uint8]) -> FloatArray:
+    angle_deg, strength = _find_edges(occupied)
+    counts = np.bincount(angle_deg.astype(np.intp) % 90, weights=strength, minlength=90)
+    bell = np.exp(-0.5 * (np.arange(-8, 9) / _BELL_DEG) ** 2)
+    wrapped = np.concatenate([counts[-8:], counts, counts[:8]])
+    return np.convolve(wrapped, bell / bell.sum(), mode="valid")
+
+
+def _find_edges(occupied: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
+    """Return the angles of the gradients at edges, in degrees, and how strong they are."""
+    soft = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), _EDGE_BLUR_CELLS)
+    across = cv2.Sobel(soft, cv2.CV_32F, 1, 0)
+    along = cv2.Sobel(soft, cv2.CV_32F, 0, 1)
+    strength, angle_deg = cv2.cartToPolar(across, along, angleInDegrees=True)
+    strong = strength > 0.3 * strength.max()
+    return angle_deg[strong].astype(np.float64), strength[strong].astype(np.float64)
