@@ -48,10 +48,11 @@ N_SHORT = 60
 N_LEAVES = 100
 N_STOPS = 12
 WARM_S = 8.0
-MOST_DRIVES = 12
+MOST_DRIVES = 30
 DRIVES_RATIO = 0.75
 WRONG_RATIO = 0.02
 """Of leaves; the mission that has one is refused whole."""
+IDLE_S = 3.0
 WITHIN_MIN = 0.1
 POLICY = Policy(areas=(PIT,), rates={CommandKind.DRIVE: MOST_DRIVES}, farthest_m=FARTHEST_M)
 LEAVES = {
@@ -227,6 +228,8 @@ async def run_random(n_missions: int, *, seed: int) -> Verdict:
                 told = await _run(client, _invent(chooser, 0), within_min=WITHIN_MIN, wait_s=25)
                 n_begun += told.startswith("At most")
                 n_drove += len(witness.goals) > n_before
+                # Without it the rate of drives would end most of them.
+                await session.robot.sleep(IDLE_S)
                 if session.drives.is_busy:
                     raise RuntimeError(f"The robot still drives after a mission: {told}")
         lines = list(read_audit(folder / "audit.jsonl"))

@@ -202,7 +202,7 @@ def test_a_mission_is_shown_as_a_tree_in_text_and_as_json() -> None:
     assert said.splitlines() == [
         "Mission mission.",
         "It takes room, a text.",
-        "At most 1 drives and 2 other commands within 10 min. A person is asked for dock.",
+        "At most 1 drive and 2 other commands within 10 min. A person is asked for dock.",
         "1 one after the other",
         '|- 2 drive "{room}"',
         "`- 3 the first that succeeds of",

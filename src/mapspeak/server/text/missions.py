@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import lead
+from mapspeak.server.text.wording import say_count
 from mapspeak.skill import JsonValue, Skill, SkillParameter
 from mapspeak.skills.arguments import say_wanted
 from mapspeak.skills.missions.questions import Question, QuestionBook
@@ -39,8 +40,8 @@ def say_bounds(bounds: MissionBounds, timeout_s: float) -> str:
     """Return what a mission may do at most."""
     asked = f" A person is asked for {', '.join(sorted(bounds.asked))}." if bounds.asked else ""
     return (
-        f"At most {bounds.n_drives} drives and {bounds.n_commands} other commands within "
-        f"{timeout_s / 60:g} min.{asked}"
+        f"At most {say_count(bounds.n_drives, 'drive')} and "
+        f"{say_count(bounds.n_commands, 'other command')} within {timeout_s / 60:g} min.{asked}"
     )
 
 
