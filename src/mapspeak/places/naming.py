@@ -187,10 +187,15 @@ def find_elsewhere(memory: SemanticMap, words: str) -> tuple[Waypoint, ...]:
         place
         for place in memory.elsewhere
         if any(
-            re.search(rf"(?<!\w){re.escape(name_key(name))}(?!\w)", wanted)
+            _contains_words(wanted, name_key(name))
             for name in (place.name, *(each.label for each in place.landmarks))
         )
     )
+
+
+def _contains_words(text: str, words: str) -> bool:
+    # Most names are not in the text at all, and a pattern for each would take seconds to compile.
+    return words in text and bool(re.search(rf"(?<!\w){re.escape(words)}(?!\w)", text))
 
 
 def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
