@@ -213,7 +213,7 @@ def _render(places: list[Waypoint]) -> str:
         record_text({k: v for k, v in data_of(each).items() if v not in (None, [])}, indent=2)
         for each in places
     )
-    return "\n".join(["version: 1\nwaypoints:", *records])
+    return "\n".join(["version: 1\nmap: map\nwaypoints:", *records])
 
 
 def _draw_observations() -> Iterator[Observation]:
