@@ -158,6 +158,7 @@ def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
         bearing_rad=bearing_rad,
         range_m=range_m,
         range_from=None if range_m is None else landmark.range_from,
+        bearing_from=None if bearing_rad is None else landmark.bearing_from,
         laser=laser,
     )
 
@@ -348,6 +349,7 @@ def _joined(before: Landmark, now: Landmark) -> Landmark:
         bearing_rad=filling.bearing_rad if base.bearing_rad is None else base.bearing_rad,
         range_m=filling.range_m if base.range_m is None else base.range_m,
         range_from=filling.range_from if base.range_m is None else base.range_from,
+        bearing_from=filling.bearing_from if base.bearing_rad is None else base.bearing_from,
         confidence=surer.confidence or (other.confidence if is_equal else None),
         note=now.note or before.note,
         pose=base.pose,

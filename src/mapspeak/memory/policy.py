@@ -75,8 +75,9 @@ def _knowledge() -> Mapping[str, Any]:
 
 @cache
 def words_of(entry: str) -> frozenset[str]:
-    """Return the words under one entry of `data/words.yaml`."""
-    return frozenset(_knowledge()[entry].split())
+    """Return the words under one entry of `data/words.yaml`, or the phrases of a list."""
+    known = _knowledge()[entry]
+    return frozenset(known.split() if isinstance(known, str) else known)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,8 @@ class Landmark:
         bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
         range_m: Its distance from that pose.
         range_from: What measured that; None where the observer judged it.
+        bearing_from: What its direction was measured in, such as a picture; None where the observer
+            judged it.
         picture: The picture it was seen in, by its relative name, if not the waypoint's.
         stamp_s: Robot time it was last seen at, if not the waypoint's.
         recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
@@ -53,13 +55,14 @@ class Landmark:
     recorded_at: datetime | None = None
     pose: Pose | None = None
     range_from: str | None = None
+    bearing_from: str | None = None
     laser: LaserFan | None = None
     n_missed: int = 0
     is_gone: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
-        _clean_lines(self, "purpose", "note", "picture", "range_from")
+        _clean_lines(self, "purpose", "note", "picture", "range_from", "bearing_from")
         if self.bearing_rad is not None:
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory.things.approach import OVERLOOK_M, find_overlook
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
@@ -131,8 +132,12 @@ def arrival_pose(world: WorldModel, point: Point) -> Pose:
 
 
 def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
-    """Return the pose that faces a thing from near, else one that it was seen from."""
-    near = world.find_approach(remembered)
+    """Return the pose that faces a thing from near, else one that it was seen from.
+
+    A thing that is not known well enough for that is looked for from where most of the places where
+    it may be are in view.
+    """
+    near = find_overlook_of(world, remembered) or world.find_approach(remembered)
     if near is not None:
         return near
     thing = remembered.thing
@@ -142,6 +147,19 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
     if thing.position is None or thing.position == pose.point:
         return pose
     return Pose(pose.x, pose.y, pose.point.bearing_to(thing.position))
+
+
+def find_overlook_of(world: WorldModel, remembered: RememberedThing) -> Pose | None:
+    """Return from where to look for a thing that may be anywhere in 1.5 m; None for others."""
+    thing, known = remembered.thing, world.reach.overlooks
+    if thing.whereabouts is None or (thing.uncertainty_m or 0.0) <= OVERLOOK_M:
+        return None
+    if remembered not in known:
+        stands, ways_m = spread_places(world)
+        seen_from = [view.place for view in thing.supporting]
+        sight = world.recollection.found.sight
+        known[remembered] = find_overlook(sight, stands, ways_m, seen_from, thing.whereabouts)
+    return known[remembered]
 
 
 def spread_places(

@@ -92,6 +92,7 @@ class Reach:
         out_of_reach: The same for regions it cannot get to.
         frontiers: By the places from which it has looked already.
         approaches: Where it would stand before a remembered thing, while that is remembered so.
+        overlooks: From where it would look for one that is not known well enough.
         faced: The share of where a thing may be that it would face there.
         fronts: The last floor before a thing, for each who saw it.
         rooms: The rooms before a thing, by id.
@@ -104,6 +105,7 @@ class Reach:
     out_of_reach: dict[str, Point] = field(default_factory=dict)
     frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
     approaches: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
+    overlooks: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
     faced: ThingMap[float] = field(default_factory=WeakKeyDictionary)
     fronts: ThingMap[list[Point]] = field(default_factory=WeakKeyDictionary)
     rooms: ThingMap[tuple[str, ...]] = field(default_factory=WeakKeyDictionary)

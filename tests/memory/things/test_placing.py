@@ -21,12 +21,46 @@ CORRIDOR = """
 """
 
 
-def seen_down_the_corridor(range_m: float | None) -> Thing:
-    mark = Landmark(label="chair", bearing_rad=0.0, range_m=range_m)
+WITH_A_TABLE = """
+    ##################################################
+    #................................................#
+    #................................................#
+    #....................####........................#
+    #....................####........................#
+    #....................####........................#
+    #................................................#
+    #................................................#
+    ##################################################
+"""
+
+
+def seen_down_the_corridor(
+    range_m: float | None, *, label: str = "chair", source: str | None = None, text: str = CORRIDOR
+) -> Thing:
+    mark = Landmark(label=label, bearing_rad=0.0, range_m=range_m, bearing_from=source)
     place = Waypoint(name="a", pose=Pose(1.0, 1.2, 0.0), functional_landmarks=(mark,))
-    grid = grid_from_text(CORRIDOR, resolution_m=0.25)
+    grid = grid_from_text(text, resolution_m=0.25)
     (thing,) = find_things(SemanticMap(waypoints=(place,)), grid).things
     return thing
+
+
+def test_what_hangs_on_walls_is_placed_at_the_wall_behind_a_table_and_not_at_the_table() -> None:
+    on_wall = seen_down_the_corridor(
+        None, label="fire extinguisher", source="picture", text=WITH_A_TABLE
+    )
+    standing = seen_down_the_corridor(None, label="crate", source="picture", text=WITH_A_TABLE)
+    assert on_wall.position is not None
+    assert on_wall.position.x > 10.0
+    assert standing.position is not None
+    assert standing.position.x < 7.0
+
+
+def test_a_direction_that_was_measured_says_more_than_one_that_was_judged() -> None:
+    judged = seen_down_the_corridor(3.0)
+    measured = seen_down_the_corridor(3.0, source="picture")
+    assert measured.uncertainty_m is not None
+    assert judged.uncertainty_m is not None
+    assert measured.uncertainty_m < judged.uncertainty_m
 
 
 @pytest.mark.parametrize(("range_m", "radius_m"), [(0.5, 0.6), (1.0, 0.8), (2.0, 1.4)])

@@ -82,6 +82,7 @@ async def test_an_image_column_is_a_bearing_from_where_the_picture_was_taken(
     assert degrees(sink.bearing_rad) == pytest.approx(math.degrees(math.atan(0.5)), abs=0.01)
     assert degrees(tap.bearing_rad) == pytest.approx(-45.0, abs=0.01)
     assert rack.bearing_rad is None
+    assert (sink.bearing_from, tap.bearing_from, rack.bearing_from) == ("picture", "picture", None)
     assert answer["seen_from"] == "x 1.50, y 1.40, yaw 0 deg, in R2"
 
 

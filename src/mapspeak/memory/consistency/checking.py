@@ -83,7 +83,8 @@ def _check(found: Things, stand: Waypoint, landmark: Landmark) -> tuple[FindingK
         return None
     spread_m = NOISE.range_m + NOISE.range_ratio * landmark.range_m
     # How far one sees at most within the noise of the direction.
-    turns = (-NOISE.bearing_rad, 0.0, NOISE.bearing_rad)
+    sigma_rad = NOISE.bearing_rad_of(landmark)
+    turns = (-sigma_rad, 0.0, sigma_rad)
     widest_m = max(_open_m(found, stand, way + turn_rad) for turn_rad in turns)
     is_behind = landmark.range_m > widest_m + BODY_M + N_SIGMAS * spread_m
     return (FindingKind.BEHIND_WALL, open_m) if is_behind else None

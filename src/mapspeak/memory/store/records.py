@@ -180,6 +180,7 @@ _LANDMARK = RecordKind(
         Key("bearing_deg", forms.BEARING, "bearing_rad"),
         Key("range_m", forms.DISTANCE),
         Key("range_from", forms.TEXT),
+        Key("bearing_from", forms.TEXT),
         Key("purpose", forms.TEXT),
         Key("confidence", forms.one_of(Confidence)),
         _NOTE,

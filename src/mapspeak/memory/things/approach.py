@@ -24,6 +24,13 @@ MISSED_M = 20.0
 beside it. Of 2, 6 and 20 the last faced most, in the buildings for choosing."""
 N_FINALISTS = 16
 """Lines of sight cost most, so that only so many of the best standing places are asked for them."""
+OVERLOOK_M = 1.5
+"""A thing that is known no better is looked for again from where most of its places are in view."""
+OVERLOOK_FAR_M = 6.0
+OVERLOOK_PATH_WEIGHT = 0.1
+"""So much of a metre nearer to it is worth a metre of way."""
+ASIDE_M, WELL_ASIDE_RAD = 4.0, math.radians(12)
+"""Directions to where a thing may be that spread so far are worth so many metres."""
 BEFORE_M = 0.2
 """The side of the cells in which a thing is looked for: the floor before it is no farther."""
 _STEP_BACK_M = 0.1
@@ -63,6 +70,40 @@ def find_approach(
         _add_missed(costs, sight, points, target, seen_from, whereabouts)
     place = Point(*points[int(np.argmin(costs))].tolist())
     return Pose(place.x, place.y, place.bearing_to(target))
+
+
+def find_overlook(
+    sight: SightMap,
+    stands: FloatArray,
+    ways_m: FloatArray,
+    seen_from: Sequence[Point],
+    whereabouts: FloatArray,
+) -> Pose | None:
+    """Find the pose from which a picture shows most of where a thing may be, from near.
+
+    Args:
+        stands: Where the robot can stand, shape (n, 2).
+        ways_m: How far it drives to each.
+    """
+    middle = np.median(whereabouts, axis=0)
+    off_m = np.hypot(*(np.median(stands[:, None] - whereabouts, axis=1)).T)
+    near = np.flatnonzero(np.hypot(*(stands - middle).T) <= OVERLOOK_FAR_M)
+    if not near.size:
+        return None
+    stands, ways_m, off_m = stands[near], ways_m[near], off_m[near]
+    yaws = np.arctan2(middle[1] - stands[:, 1], middle[0] - stands[:, 0])
+    is_ahead = _have_ahead(stands, yaws, whereabouts, within_m=OVERLOOK_FAR_M)
+    costs = off_m + OVERLOOK_PATH_WEIGHT * ways_m + MISSED_M * (1 - is_ahead.mean(axis=1))
+    # From the side a second direction tells how far away it is.
+    bearings = np.arctan2(whereabouts[:, 1] - stands[:, 1:], whereabouts[:, 0] - stands[:, :1])
+    aside_rad = np.remainder(bearings - yaws[:, None] + math.pi, math.tau) - math.pi
+    costs += ASIDE_M * np.maximum(1 - aside_rad.std(axis=1) / WELL_ASIDE_RAD, 0.0)
+    first = np.argsort(costs, kind="stable")[:N_FINALISTS]
+    is_seen = _have_in_sight(sight, stands[first], seen_from, whereabouts)
+    hidden = (is_ahead[first] & ~is_seen).mean(axis=1)
+    best = int(first[np.argmin(costs[first] + MISSED_M * hidden)])
+    x, y = stands[best].tolist()
+    return Pose(x, y, float(yaws[best]))
 
 
 def find_least_path_m(
@@ -112,13 +153,15 @@ def _add_missed(
     costs[first] = kept
 
 
-def _have_ahead(stands: FloatArray, yaws: FloatArray, places: FloatArray) -> Mask:
+def _have_ahead(
+    stands: FloatArray, yaws: FloatArray, places: FloatArray, *, within_m: float = FACED_M
+) -> Mask:
     """Return True for each viewpoint (row) and place (column) ahead of it and near."""
     east = places[:, 0] - stands[:, :1]
     north = places[:, 1] - stands[:, 1:]
     cos, sin = np.cos(yaws)[:, None], np.sin(yaws)[:, None]
     ahead, aside = east * cos + north * sin, np.abs(north * cos - east * sin)
-    is_near = east * east + north * north <= FACED_M * FACED_M
+    is_near = east * east + north * north <= within_m * within_m
     return np.asarray(is_near & (aside <= ahead * math.tan(FACED_RAD)))
 
 

@@ -166,6 +166,15 @@ def _solve(sight: SightMap, pool: Sequence[WeighedView]) -> list[Located]:
 
 
 def _place(posteriors: Posteriors, group: Group) -> Placement:
+    """Place a thing by all its views, or by the surest of two directions that hardly agree."""
+    together = _place_by(posteriors, group)
+    if len(group) != 2 or any(each.landmark.range_m is not None for each in group):
+        return together
+    alone = (_place_by(posteriors, [each]) for each in group)
+    return min((together, *alone), key=lambda each: each.uncertainty_m)
+
+
+def _place_by(posteriors: Posteriors, group: Group) -> Placement:
     seen_from = [each.waypoint.pose.point for each in group]
     posterior, (first, *more) = posteriors.of(group), group
     if first.landmark.range_m is not None and first.likelihood is not None and not more:

@@ -57,7 +57,12 @@ class _Ballot:
         self._weights = np.log1p(self.ratios)
         self._by_voter = np.argsort(self.voters, kind="stable")
         self._ends = np.searchsorted(self.voters[self._by_voter], np.arange(len(sizes) + 1))
-        log_priors = find_log_priors(sight, self.places, (each.update for each in likelihoods))
+        log_priors = find_log_priors(
+            sight,
+            self.places,
+            (each.update for each in likelihoods),
+            on_wall=sightings[0].is_on_wall,
+        )
         n_places = len(self.places)
         self.votes: FloatArray = log_priors + np.bincount(
             self._at, weights=self._weights, minlength=n_places

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from mapspeak.memory.policy import words_of
-from mapspeak.memory.search.kinds import ThingKind, find_kinds_called
+from mapspeak.memory.search.kinds import ThingKind, find_kinds, find_kinds_called
 from mapspeak.memory.search.wordindex import without_accents
 
 MOST_KEPT = 65_536
@@ -42,6 +42,13 @@ def name_the_same(label: str, other: str) -> bool:
     """
     one, two = _parts_of(label), _parts_of(other)
     return not _are_marked_apart(one, two) and _have_one_name(one, two)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def hangs_on_walls(label: str) -> bool:
+    """Return True for things that hang on walls, as is commonly known: "fire extinguisher"."""
+    kinds = _parts_of(label).kinds or find_kinds(label)
+    return any(name in words_of("on_walls") for kind in kinds for name in kind.names)
 
 
 def group_names(labels: Sequence[str]) -> list[frozenset[str]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory.things.labels import hangs_on_walls
 from mapspeak.memory.things.sight import (
     BODY_M,
     LaserUpdate,
@@ -45,7 +46,7 @@ def find_spot(pose: Pose, landmark: Landmark) -> RangedSpot | None:
     # A range ends at the surface or in the middle of a thing; nobody says which.
     body = (BODY_M / 2) ** 2
     along = (NOISE.range_m + NOISE.range_ratio * far_m) ** 2 + body
-    across = (NOISE.bearing_rad * far_m) ** 2 + body
+    across = (NOISE.bearing_rad_of(landmark) * far_m) ** 2 + body
     cos, sin = math.cos(way), math.sin(way)
     return RangedSpot(
         point=Point(pose.x + far_m * cos, pose.y + far_m * sin),
@@ -141,7 +142,7 @@ def weigh_view(
     cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
     update = None
     if landmark.bearing_rad is not None:
-        sigma = NOISE.bearing_rad
+        sigma = NOISE.bearing_rad_of(landmark)
         ahead = pose.yaw_rad + landmark.bearing_rad - sight.grid.origin.yaw_rad
         off = np.abs(np.remainder(outlook.angles - ahead + math.pi, math.tau) - math.pi)
         near = np.flatnonzero(off <= _FARTHEST_SIGMAS * sigma)
@@ -159,6 +160,7 @@ def weigh_view(
                 seen=ratios,
             )
         ratios = ratios * bell
+    ratios = ratios * np.exp(-0.5 * (ranges_m / NOISE.named_m) ** 2)
     if landmark.range_m is not None:
         ratios = ratios * _weigh_range(ranges_m, landmark.range_m)
     return ViewLikelihood(cells=cells, ratios=ratios, update=update)
@@ -168,7 +170,7 @@ def _weigh_range(ranges_m: FloatArray, told_m: float) -> FloatArray:
     sigma = NOISE.range_m + NOISE.range_ratio * ranges_m
     bell = np.exp(-0.5 * ((told_m - ranges_m) / sigma) ** 2) / (sigma * math.sqrt(math.tau))
     wrong = NOISE.wrong_range_ratio
-    return np.asarray((1 - wrong) * bell * NOISE.reach_m + wrong, dtype=np.float64)
+    return np.asarray((1 - wrong) * bell * NOISE.named_m + wrong, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -179,6 +181,7 @@ class WeighedView:
         waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
         likelihood: Where it may be; None where nothing says.
         spot: Where its direction and range together say that it is; None without both.
+        is_on_wall: Such things hang on walls.
     """
 
     waypoint: Waypoint
@@ -187,6 +190,7 @@ class WeighedView:
     wrong_ratio: float
     likelihood: ViewLikelihood | None
     spot: RangedSpot | None
+    is_on_wall: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -243,6 +247,7 @@ def _read(
                     wrong_ratio=NOISE.wrong_ratio_of(landmark.confidence),
                     likelihood=likelihood if likelihood and np.any(likelihood.ratios) else None,
                     spot=find_spot(waypoint.pose, landmark),
+                    is_on_wall=hangs_on_walls(landmark.label),
                 )
             )
     return Surroundings(near_m=near_m, far_m=far_m, sightings=tuple(sightings))

@@ -23,7 +23,7 @@ _MOST_PEAKS = 25
 N_WHEREABOUTS = 40
 """Enough to tell shares of the weight to within a few in a hundred, few enough to keep."""
 HELD_RATIO = 0.9
-MISJOINED_RATIO = 0.07
+MISJOINED_RATIO = 0.1
 """Of things, so many have a view of another one among theirs; half of these lie within all the
 same. The weight knows nothing of that, so that a little more of it has to be held."""
 _HELD_WEIGHT_RATIO = (HELD_RATIO - MISJOINED_RATIO / 2) / (1 - MISJOINED_RATIO)
@@ -179,7 +179,9 @@ def _log_weights(sight: SightMap, views: Sequence[WeighedView]) -> tuple[IntArra
         is_spoken_of[each.cells] = True
     cells = np.flatnonzero(is_spoken_of)
     logs = np.empty((len(views) + 1, len(cells)))
-    logs[0] = find_log_priors(sight, cells, (each.update for each in said))
+    logs[0] = find_log_priors(
+        sight, cells, (each.update for each in said), on_wall=views[0].is_on_wall
+    )
     for i, (view, each) in enumerate(zip(views, said, strict=True), start=1):
         logs[i] = view.wrong_ratio
         logs[i, np.searchsorted(cells, each.cells)] += (1 - view.wrong_ratio) * each.ratios

@@ -24,6 +24,7 @@ from mapspeak.memory.laserfan import LaserFan
 from mapspeak.memory.things.thing import NOISE
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.rooms import build_cleared
 from mapspeak.spatial.visibility import measure_sight
 
 N_RAYS = 240
@@ -48,6 +49,7 @@ class SightMap:
         wall_off: The same where what stands free does not count.
         factor: How many cells of the map make the side of one of the lattice.
         log_prior: How likely a thing is in each lattice cell before any view, as a logarithm.
+        wall_log_prior: The same of a thing that hangs on walls.
         rows: Of the place that stands for each lattice cell: the middle of its obstacles.
         cols: The same, in fractional cells of the map.
     """
@@ -57,6 +59,7 @@ class SightMap:
     wall_off: Clearance
     factor: int
     log_prior: FloatArray
+    wall_log_prior: FloatArray
     rows: FloatArray
     cols: FloatArray
 
@@ -86,18 +89,23 @@ class SightMap:
 def build_sight_map(grid: OccupancyGrid) -> SightMap:
     """Make a map ready: what blocks sight, and where things may stand."""
     # Nobody sees into furniture, so that its inside is unknown, too.
-    blocked = (grid.occupied & ~_small_parts(grid, grid.occupied)) | (
-        grid.unknown & ~_small_parts(grid, grid.unknown)
-    )
+    cleared = build_cleared(grid)
+    walls = grid.occupied & ~_small_parts(grid, grid.occupied) & ~cleared
+    blocked = walls | (grid.unknown & ~_small_parts(grid, grid.unknown) & ~cleared)
     factor = max(round(LATTICE_M / grid.resolution_m), 1)
     shares, rows, cols = _summarise(grid.occupied, factor)
-    on_floor = math.log(min(NOISE.floor_per_m * factor * grid.resolution_m, 1.0))
+    on_floor = min(NOISE.floor_per_m * factor * grid.resolution_m, 1.0)
+    has_wall, has_any = _summarise(walls, factor)[0] > 0, shares > 0
+    on_furniture = NOISE.on_furniture_ratio
     return SightMap(
         grid=grid,
         obstacle_off=_off(grid.occupied | grid.unknown),
         wall_off=_off(blocked),
         factor=factor,
-        log_prior=np.where(shares > 0, 0.0, on_floor),
+        log_prior=np.log(np.where(has_any, 1.0, on_floor)),
+        wall_log_prior=np.log(
+            np.where(has_wall, 1.0, np.where(has_any, on_furniture, on_floor * on_furniture))
+        ),
         rows=rows,
         cols=cols,
     )
@@ -216,10 +224,10 @@ def correct_by_laser(
 
 
 def find_log_priors(
-    sight: SightMap, cells: IntArray, updates: Iterable[LaserUpdate | None]
+    sight: SightMap, cells: IntArray, updates: Iterable[LaserUpdate | None], *, on_wall: bool
 ) -> FloatArray:
     """Return how likely a thing is in rising lattice cells before any view, as a logarithm."""
-    logs = sight.log_prior.ravel()[cells]
+    logs = (sight.wall_log_prior if on_wall else sight.log_prior).ravel()[cells]
     told = [each for each in updates if each is not None and each.cells.size]
     if not told:
         return logs

@@ -20,7 +20,8 @@ class NoiseModel:
     of the thing; else its direction is off by a Gaussian, and its range, where it has one, too.
 
     Attributes:
-        bearing_rad: Standard deviation of a direction: what people and models read off a picture.
+        bearing_rad: Standard deviation of a direction that an observer judges.
+        measured_rad: The same of one that was measured, such as by the column of a picture.
         wrong_ratio: The share of views that are wrong as a whole.
         range_m: The part of a range's standard deviation that is the same near and far.
         range_ratio: The part that grows with the range.
@@ -30,6 +31,8 @@ class NoiseModel:
         seen_over_ratio: How often one sees over something that stands free, such as a table.
         floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
         reach_m: Nobody names a thing that is farther.
+        named_m: At so many metres things are named .61 times as often as near by (a Gaussian).
+        on_furniture_ratio: How likely what hangs on walls is at what stands free.
         laser_m: Standard deviation of where the middle of a cell is that a beam of the laser ended
             in: what pose and map are good to, and half a cell.
         laser_update_m: A beam that ends nearer to something on the map has met just that.
@@ -41,17 +44,25 @@ class NoiseModel:
     """
 
     bearing_rad: float = math.radians(10)
+    measured_rad: float = math.radians(3.5)
     wrong_ratio: float = 0.2
     range_m: float = 0.1
     range_ratio: float = 0.15
     wrong_range_ratio: float = 0.02
     seen_over_ratio: float = 0.5
     floor_per_m: float = 0.1
-    reach_m: float = 10.0
+    reach_m: float = 20.0
+    named_m: float = 10.0
+    on_furniture_ratio: float = 0.1
     laser_m: float = 0.15
     laser_update_m: float = 0.3
     laser_met_ratio: float = 0.9
     laser_through_ratio: float = 0.8
+
+    def bearing_rad_of(self, landmark: Landmark) -> float:
+        """Return the standard deviation of a landmark's direction."""
+        is_judged = landmark.bearing_from is None
+        return self.bearing_rad if is_judged else self.measured_rad
 
     def wrong_ratio_of(self, confidence: Confidence | None) -> float:
         """Return how often views are wrong whose observer was so sure."""

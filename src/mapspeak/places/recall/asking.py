@@ -16,6 +16,7 @@ from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKi
 from mapspeak.places.goalcheck import GoalCheck, judge_goal
 from mapspeak.places.naming import Place, find_elsewhere
 from mapspeak.places.relations.choosing import stand_at
+from mapspeak.places.standing import find_overlook_of
 from mapspeak.places.things import split_room
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
@@ -224,7 +225,8 @@ def describe_candidate(
         thing, views = remembered.thing, list(_list_views(world, remembered))
         name, position, uncertainty_m = thing.label, thing.position, thing.uncertainty_m
         seen_from, pictures = [each for each, _ in views], [view.picture for _, view in views]
-        is_faced = world.find_approach(remembered) is not None
+        is_looked_for = find_overlook_of(world, remembered) is not None
+        is_faced = world.find_approach(remembered) is not None and not is_looked_for
         faced_ratio = world.measure_faced(remembered)
         trust = world.judge.judge_thing(remembered)
     pose = stand_at(world, Place(remembered.id, remembered))

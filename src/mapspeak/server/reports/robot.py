@@ -65,7 +65,10 @@ NEXT_STEP = {
     GoalState.TIMED_OUT: "The robot was told to stop. Check its navigation, then send a new goal.",
     GoalState.LOST: "The robot was told to stop. Check where it is, then send a new goal.",
 }
-AT_THING = "{look_at} tells whether the thing is in view, and where."
+AT_THING = (
+    "Take one look: {look_at} tells whether the thing is in view, and where; "
+    "{write_semantic_data} keeps what is seen, with gone for what is not there."
+)
 STOP_OWED = (
     "NOT STOPPED: the robot could not be told yet and may drive on. It is told as soon as it can "
     "be reached; press its own stop button if it must stand now."

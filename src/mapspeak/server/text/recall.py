@@ -6,6 +6,7 @@ from mapspeak.geometry import Point
 from mapspeak.memory.quoting import name_key, quote, quote_name
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.memory.store.forgetting import Forgotten
+from mapspeak.memory.things.approach import OVERLOOK_M
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
@@ -15,6 +16,10 @@ from mapspeak.worldmodel.recollection import RememberedPlace
 LONGEST_QUOTE = 120
 MOST_LEFT_NAMED = 100
 LOOK_FOR = "Look for it with {search_for}."
+LOOK_AGAIN = (
+    "Look again on arrival: the robot stops where most of the places where it may be are in view. "
+    "{write_semantic_data} with its column in that picture places it; then drive on."
+)
 DOUBTS = {
     RecallDoubt.DOUBTFUL_RECORD: "its record is doubtful",
     RecallDoubt.NOT_NOTED: "where it is was not noted",
@@ -107,8 +112,16 @@ def _say_found(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
         way = lead("{navigate_to} {id} goes where it was seen.", id=first.id)
     else:
         way = lead("{navigate_to} takes {id}.", id=first.id)
-    look = "Look before you rely on it." if doubt and first.position is not None else ""
-    return " ".join(filter(None, (said, way, look)))
+    return " ".join(filter(None, (said, way, _say_look(first, doubt))))
+
+
+def _say_look(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
+    """Ask for a look at what was found; nothing where it is sure."""
+    if doubt is None or first.position is None:
+        return ""
+    if (first.uncertainty_m or 0.0) > OVERLOOK_M:
+        return lead(LOOK_AGAIN)
+    return "Look before you rely on it."
 
 
 def _say_doubt(first: RecallCandidate, doubt: RecallDoubt) -> str:

@@ -41,6 +41,8 @@ FARTHEST_SEEN_M = 100.0
 """No camera on a robot tells what a thing is from farther away."""
 
 FULL_TURN_DEG = 360.0
+READ_OFF = "picture"
+"""What a direction was measured in that is told as a column."""
 
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 
@@ -191,6 +193,7 @@ class Annotator:
             bearing_rad=bearing_rad,
             range_m=range_m,
             range_from=range_from,
+            bearing_from=None if thing.image_column_px is None else READ_OFF,
             confidence=thing.confidence,
             note=self._told(thing, "note"),
             picture=None if other is None else other.name,

@@ -10,10 +10,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.spatial.grid import Mask, OccupancyGrid
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.directions import find_wall_directions
 from mapspeak.spatial.rooms.furniture import find_blocks
-from mapspeak.spatial.rooms.raster import SETTINGS, Picture, Raster, drop_specks, find_cells
+from mapspeak.spatial.rooms.raster import (
+    SETTINGS,
+    Picture,
+    Raster,
+    build_raster,
+    drop_specks,
+    find_cells,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -57,6 +65,12 @@ def build_floor(raster: Raster) -> Floor:
         directions_deg=directions,
         clearance_m=_clearance(floor, raster.cell_size_m),
     )
+
+
+def build_cleared(grid: OccupancyGrid) -> Mask:
+    """Return True for the cells of a map that are floor, furniture or small unseen pockets."""
+    raster = build_raster(grid)
+    return raster.on_grid(build_floor(raster).floor.astype(np.int32)) > 0
 
 
 def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
