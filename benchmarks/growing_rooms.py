@@ -30,7 +30,7 @@ from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import Bounds
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.geometry import Pose
 from mapspeak.links.simulated import SimulatedRobot
 from mapspeak.memory import SemanticMapStore

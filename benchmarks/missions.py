@@ -38,7 +38,7 @@ from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world
 from mapspeak.skill import SkilledRobot
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 
 __all__ = ["main", "measure"]
 

@@ -49,7 +49,7 @@ from mapspeak.server.app import build_server
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 
 __all__ = ["main", "measure"]
 

@@ -8,7 +8,7 @@ from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import Effect, Event
-from mapspeak.places.recall.notices import (
+from mapspeak.places.recall.events import (
     close_floor_of,
     find_hindrances,
 )

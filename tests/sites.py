@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import (
     MAP,
     MEMORY,

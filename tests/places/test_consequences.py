@@ -22,7 +22,7 @@ from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.memory.events import Effect
 from mapspeak.places.goalcheck import GoalVerdict, say_check
-from mapspeak.places.recall.notices import (
+from mapspeak.places.recall.events import (
     close_floor_of,
     find_cut_off,
 )

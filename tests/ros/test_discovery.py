@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from mapspeak.errors import ConfigError
-from mapspeak.ros.discovery.choosing import choose_profile
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings, load_robot_file
 from mapspeak.ros.discovery.profile import (
     NavigationKind,
@@ -14,6 +13,7 @@ from mapspeak.ros.discovery.profile import (
     RobotPart,
     RobotProfile,
 )
+from mapspeak.ros.discovery.topics import choose_profile
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosGraph
 

@@ -29,7 +29,7 @@ from mapspeak.safety import (
     Situation,
     decide,
 )
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 
 NOW = Situation()
 STAIRS = ClosedArea(name="stairs", outline=(Point(1, 1), Point(2, 1), Point(2, 2)))

@@ -10,7 +10,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.safety.planning import STRAY_M, plan_legs
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import find_path
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea
+from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
 RADIUS_M = 0.3

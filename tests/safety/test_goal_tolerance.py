@@ -12,7 +12,7 @@ from mapspeak.robot import GoalState
 from mapspeak.safety import AreaRule, GuardedRobot, Policy, Surveyor
 from mapspeak.safety.monitor import KEEP_M
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 
 pytestmark = pytest.mark.anyio
 

@@ -29,7 +29,7 @@ from mapspeak.safety import (
 )
 from mapspeak.safety.monitor import KEEP_M
 from mapspeak.session import Session
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 
 pytestmark = pytest.mark.anyio
 

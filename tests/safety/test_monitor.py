@@ -8,7 +8,7 @@ from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Cause, CauseCode
 from mapspeak.safety.monitor import AT_AREA, GoalMonitor, KeepOutMonitor, Mover
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea
+from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
 RADIUS_M = 0.3

@@ -14,7 +14,7 @@ from mapspeak.safety import (
     WhenBusy,
     load_policy,
 )
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 
 
 def policy_of(folder: Path, text: str) -> Policy:

@@ -8,7 +8,7 @@ from closing import EAST, NOW, RADIUS_M, WEST, event, goes_north, office, revisi
 from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.events import Effect, Event
-from mapspeak.places.recall.notices import (
+from mapspeak.places.recall.events import (
     close_floor_of,
     say_unplaced,
 )

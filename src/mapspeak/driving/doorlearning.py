@@ -12,10 +12,10 @@ from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore
 from mapspeak.memory.events import OPEN_AGAIN, ROBOT, SHUT, Effect, Event, current_events
-from mapspeak.places.recall.notices import end_event, find_hindrances
+from mapspeak.places.recall.events import end_event, find_hindrances
 from mapspeak.robot import GoalState
 from mapspeak.spatial.paths import Path
-from mapspeak.worldmodel.closures import outline_of_door
+from mapspeak.worldmodel.keepout import outline_of_door
 from mapspeak.worldmodel.revision import MapRevision
 
 AHEAD_M = 1.5

@@ -11,7 +11,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, distances_from
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, ClosedFloor
+from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea, ClosedFloor
 
 Opened = Callable[[Point], DistanceField]
 

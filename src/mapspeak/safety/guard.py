@@ -14,7 +14,7 @@ from mapspeak.errors import PolicyError
 from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
 from mapspeak.memory.events import Effect, Event
-from mapspeak.places.recall.notices import (
+from mapspeak.places.recall.events import (
     close_floor_of,
     find_hindrances,
     say_events,
@@ -26,7 +26,7 @@ from mapspeak.safety.commands import Command, CommandKind, DriveCommand
 from mapspeak.safety.deciding import Allowed, Decision, NeedsApproval, Refused, Situation, decide
 from mapspeak.safety.policy import AreaRule, Otherwise, Policy
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.closures import ClosedArea, Outline, mask_areas, outlines_of_region
+from mapspeak.worldmodel.keepout import ClosedArea, Outline, mask_areas, outlines_of_region
 from mapspeak.worldmodel.revision import MapRevision
 
 logger = logging.getLogger(__name__)

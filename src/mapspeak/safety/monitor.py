@@ -10,7 +10,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.hold import Hold
 from mapspeak.robot import Cause, CauseCode, Robot
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
 OCCUPIED_FOR_S = 5.0

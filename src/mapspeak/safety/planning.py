@@ -18,7 +18,7 @@ from mapspeak.safety.monitor import KEEP_M, GoalMonitor
 from mapspeak.safety.policy import Policy
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, find_path
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, distance_to_sides
+from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea, distance_to_sides
 from mapspeak.worldmodel.revision import MapRevision
 
 STEP_M = 0.1

@@ -31,7 +31,7 @@ from mapspeak.safety.policy import (
 from mapspeak.settings import read_settings
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
-from mapspeak.worldmodel.closures import Outline
+from mapspeak.worldmodel.keepout import Outline
 
 CLOSED = 100
 """Nav2 makes a cell lethal at this value alone; less makes it dear, as for preferred lanes."""

@@ -13,7 +13,7 @@ from mapspeak.spatial.paths import DistanceField, Path, clearance_m, distances_f
 from mapspeak.spatial.paths.lattice import Clearance
 from mapspeak.spatial.paths.wavefront import Costs
 from mapspeak.spatial.rooms import CorridorWalk, Region, RoomMap, find_rooms, walk_along
-from mapspeak.worldmodel.closures import ClosedArea, close_floor, mask_areas
+from mapspeak.worldmodel.keepout import ClosedArea, close_floor, mask_areas
 
 STEP_M = 0.1
 

@@ -7,7 +7,7 @@ import pytest
 from mapspeak.evaluation.agent import ServerAccess
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.workplace import open_inspection
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import find_task
 from mapspeak.evaluation.trials import Failure, Trial, TrialResult, TrialState, read_turns
 from sites import make_flat

@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import pytest
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import (
     Evidence,
     judge_choice,
@@ -20,7 +21,6 @@ from mapspeak.evaluation.scores.judging import (
     read_word,
     spl,
 )
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Failure, ToolCall, TrialState
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid

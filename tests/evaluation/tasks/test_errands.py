@@ -2,8 +2,8 @@
 
 import pytest
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.evaluation.tasks.errands import judge_errand
 from mapspeak.evaluation.tasks.task import Truth

@@ -11,8 +11,8 @@ from mapspeak.evaluation.agents.baselines import answer_at_random
 from mapspeak.evaluation.agents.finding import SCRIPTS
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.runs.workplace import open_inspection
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.ros.messages.fields import Dialect

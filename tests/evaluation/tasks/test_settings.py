@@ -3,7 +3,7 @@ import re
 
 import pytest
 
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.geometry import Point, Pose
 from mapspeak.server.prompts import read_text

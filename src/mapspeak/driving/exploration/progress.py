@@ -16,7 +16,7 @@ from mapspeak.spatial.frontiers import (
     RefusedFrontier,
 )
 from mapspeak.spatial.paths import DistanceField
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = 0.5

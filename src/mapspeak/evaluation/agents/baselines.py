@@ -10,7 +10,7 @@ import numpy as np
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient, gave_up
 from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label, read_map_picture
 from mapspeak.evaluation.agents.scripted import follow_script
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid

@@ -18,7 +18,7 @@ from mapspeak.evaluation.agents.command.program import find_program
 from mapspeak.evaluation.agents.models.chat import Begin, Thinking, work_with_model
 from mapspeak.evaluation.agents.models.mock import MockModel
 from mapspeak.evaluation.agents.scripted import follow_script
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.installation import say_install
 

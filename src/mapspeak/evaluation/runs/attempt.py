@@ -23,8 +23,8 @@ from mapspeak.evaluation.agent import (
 )
 from mapspeak.evaluation.agents.finding import find_agent
 from mapspeak.evaluation.runs.workplace import CONTROL, TrialSetup, open_workplace
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import find_task
 from mapspeak.evaluation.trials import (
     MAP,

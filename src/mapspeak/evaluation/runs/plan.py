@@ -11,7 +11,7 @@ import numpy as np
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.finding import can_think, find_versions, read_thinking
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import EXPLORE, choose_tasks, find_task
 from mapspeak.evaluation.tasks.task import Task
 from mapspeak.evaluation.trials import Trial

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
+from mapspeak.evaluation.scores.groundtruth import BESIDE_M, GroundTruth
 from mapspeak.evaluation.trials import Failure, Score, ToolCall, TrialState
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.simulator import StateRecord, WorldObject, measure_shares_in_view

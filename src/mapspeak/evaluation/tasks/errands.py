@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from mapspeak.evaluation.scores.groundtruth import BESIDE_M, GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence, verdict
-from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.failures import find_doors
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
 from mapspeak.evaluation.tasks.things import SEARCH_TOOLS, findable_kinds

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence, judge_room, read_word, verdict
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, pair, point_text
 from mapspeak.evaluation.tasks.things import (
     SEARCH_LIMITS,

@@ -12,8 +12,8 @@ from ruamel.yaml import YAML
 
 from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
 from mapspeak.evaluation.inspected.playing import InspectedSystem
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence, no_answer, read_said, verdict
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.ros.messages.fields import Dialect

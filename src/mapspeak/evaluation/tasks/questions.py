@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import (
     Evidence,
     count_known,
@@ -13,7 +14,6 @@ from mapspeak.evaluation.scores.judging import (
     read_point,
     verdict,
 )
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth, pair, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point, Pose

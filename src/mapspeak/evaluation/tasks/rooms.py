@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import judge_room
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, point_text
 from mapspeak.evaluation.trials import Setting
 from mapspeak.simulator import MeasuredRoom

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import WorldObject

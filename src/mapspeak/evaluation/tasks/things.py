@@ -7,6 +7,7 @@ from importlib import resources
 import numpy as np
 from ruamel.yaml import YAML
 
+from mapspeak.evaluation.scores.groundtruth import BESIDE_M, GroundTruth
 from mapspeak.evaluation.scores.judging import (
     Evidence,
     judge_near,
@@ -15,7 +16,6 @@ from mapspeak.evaluation.scores.judging import (
     judge_thing,
     judge_view,
 )
-from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point

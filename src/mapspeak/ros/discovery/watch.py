@@ -9,7 +9,6 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.discovery.choosing import choose_profile, find_namespaces
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.profile import (
     RobotPart,
@@ -17,6 +16,7 @@ from mapspeak.ros.discovery.profile import (
     find_missing,
     improve,
 )
+from mapspeak.ros.discovery.topics import choose_profile, find_namespaces
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosConnection, RosGraph
 from mapspeak.ros.transforms import FrameListener

@@ -7,8 +7,8 @@ import anyio.to_thread
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.discovery.choosing import MAP, MAP_UPDATE
 from mapspeak.ros.discovery.profile import RobotPart, RobotProfile
+from mapspeak.ros.discovery.topics import MAP, MAP_UPDATE
 from mapspeak.ros.messages.fields import Message, read_stamp
 from mapspeak.ros.messages.grids import apply_grid_update, read_grid
 from mapspeak.ros.port import LinkKind, RosConnection

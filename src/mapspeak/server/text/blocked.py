@@ -10,7 +10,7 @@ from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place
-from mapspeak.places.recall.notices import say_events, say_unplaced
+from mapspeak.places.recall.events import say_events, say_unplaced
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.places.standing import find_standing_point
 from mapspeak.server.text.drives import say_end

@@ -18,7 +18,7 @@ from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.spatial.viewing import CameraView, mask_pictured, outline_unpictured
-from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 

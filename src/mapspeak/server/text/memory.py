@@ -17,8 +17,8 @@ from mapspeak.memory.episodes.observation import (
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import FrameId, Frames
 from mapspeak.memory.quoting import quote, quote_name, tell_name
+from mapspeak.places.recall.events import closes_robot_in, find_cut_off
 from mapspeak.places.recall.nearby import Nearby
-from mapspeak.places.recall.notices import closes_robot_in, find_cut_off
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten

@@ -14,7 +14,7 @@ from mapspeak.memory.events import tell_place
 from mapspeak.places.standing import find_standing_point
 from mapspeak.robot import PoseDoubt
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.closures import ClosedArea, ClosedFloor
+from mapspeak.worldmodel.keepout import ClosedArea, ClosedFloor
 from mapspeak.worldmodel.model import WorldModel
 
 Item = TypeVar("Item")

@@ -21,7 +21,7 @@ from mapspeak.memory.events import Every, is_name_of_robot
 from mapspeak.memory.store.forgetting import restore
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import find_renamed
-from mapspeak.places.recall import notices
+from mapspeak.places.recall import events
 from mapspeak.places.recall.forgetting import forget
 from mapspeak.places.recall.nearby import find_nearby
 from mapspeak.server.text.findings import say_moved, say_receipt
@@ -223,7 +223,7 @@ class MemoryTools:
 
         def note() -> str:
             _require_present_ids(world, place or "")
-            event = notices.note_event(
+            event = events.note_event(
                 world,
                 session.memory,
                 text=text,
@@ -254,7 +254,7 @@ class MemoryTools:
             raise SemanticMapError(
                 "The time by the calendar is not known here.", hint="Nothing was changed."
             )
-        ended = await session.compute(lambda: notices.end_event(session.memory, event, now=now))
+        ended = await session.compute(lambda: events.end_event(session.memory, event, now=now))
         said = ended.sentence(now)
         try:
             world = await session.fetch_world_model()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import TrueRoom, World, WorldWall
 from mapspeak.spatial.rooms import RoomClass

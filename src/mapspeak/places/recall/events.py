@@ -20,7 +20,7 @@ from mapspeak.memory.events import (
 from mapspeak.places.naming import Place, Spot, Thing
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.spatial.rooms import Door, Region, RoomMap
-from mapspeak.worldmodel.closures import (
+from mapspeak.worldmodel.keepout import (
     ClosedArea,
     Outline,
     outline_around,

@@ -9,7 +9,7 @@ from mapspeak.places.goalcheck import GoalVerdict, check_goal, say_check
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, close_floor
+from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea, close_floor
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.revision import MapRevision
 

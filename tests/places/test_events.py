@@ -11,7 +11,7 @@ from closing import EAST, LATER, NOW, WEST, event, goes_north, revision_with, wo
 from mapspeak.errors import GoalError, SemanticMapError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.events import Effect
-from mapspeak.places.recall.notices import (
+from mapspeak.places.recall.events import (
     close_floor_of,
     closes_robot_in,
     end_event,
@@ -20,7 +20,7 @@ from mapspeak.places.recall.notices import (
     say_events,
     say_unplaced,
 )
-from mapspeak.worldmodel.closures import MARGIN_M, POST_M, SILL_M
+from mapspeak.worldmodel.keepout import MARGIN_M, POST_M, SILL_M
 
 
 @pytest.fixture
