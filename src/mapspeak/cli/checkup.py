@@ -1,4 +1,4 @@
-"""`mapspeak doctor`: what a robot offers and really gives, and how to start what is missing."""
+"""`mapspeak doctor`: check what a robot offers and delivers, and how to start missing parts."""
 
 import json
 import math
@@ -31,15 +31,15 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
 OLD_POSE_S = 5.0
-"""A pose older than this is no answer to where a driving robot is."""
+"""A pose older than this does not locate a driving robot."""
 ON_MAP_M = 0.3
-"""What a laser meets no farther from what the map has is that very thing."""
+"""A laser hit within this distance of an obstacle on the map counts as that obstacle."""
 LEAST_ON_MAP_RATIO = 0.5
 """People and moved chairs take beams away, but hardly every other one."""
 
 
 class Health(StrEnum):
-    """How it stands with one thing that a robot should offer."""
+    """The state of one thing that a robot should offer."""
 
     FINE = "fine"
     DOUBTFUL = "doubtful"
@@ -52,7 +52,7 @@ class Finding:
 
     Attributes:
         what: The thing: map, pose, camera, ...
-        health: How it stands with it.
+        health: Its state.
         said: What was found, with numbers and units.
         hint: What to start or to change; empty where all is well.
     """
@@ -64,7 +64,7 @@ class Finding:
 
 
 async def examine(robot: Robot) -> tuple[Finding, ...]:
-    """Ask a robot for its map, its pose and a picture, and judge what comes."""
+    """Ask a robot for its map, its pose and a picture, and judge the answers."""
     # A map that does not come is waited for once.
     grid: OccupancyGrid | None = None
     try:
@@ -200,7 +200,7 @@ async def _look_at_laser(robot: Robot, grid: OccupancyGrid | None) -> Finding:
 
 
 def _share_on_map(grid: OccupancyGrid, scan: RangeScan) -> float | None:
-    """Return share of what a laser met that lies at what the map has; None where it met none."""
+    """Return the share of laser hits at obstacles on the map; None without hits."""
     is_met = np.isfinite(scan.ranges_m)
     if not is_met.any():
         return None
@@ -234,7 +234,7 @@ def describe_profile(
     Args:
         profile: What was found.
         link: How we are connected.
-        reason: Why in that way; empty where nobody could wonder.
+        reason: Why in that way; empty where it is obvious.
         map_age_s: Since the map's stamp; None where there is no map.
     """
     ros = "ROS 1" if profile.dialect == "ros1" else "ROS 2"

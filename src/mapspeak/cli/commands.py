@@ -1,4 +1,4 @@
-"""All commands, and what becomes of errors."""
+"""All commands, and how errors are shown."""
 
 import sys
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "stop": ("operating:stop", "stop every robot that is served from here, and hold it"),
     "view": ("viewing:view", "show a running server in the browser, or replay what is over"),
 }
-"""Where each command is, and what it does; a module is imported when its command is wanted."""
+"""The module and summary of each command; a module is imported when its command runs."""
 
 
 MEMORY_COMMANDS: Mapping[str, tuple[str, str]] = {
@@ -58,7 +58,7 @@ class CommandGroup(click.Group):
         return list(self._table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - as in click
-        """Import a command; None where there is none of that name."""
+        """Import a command; return None for an unknown name."""
         if cmd_name not in self._table:
             return None
         module, _, name = self._table[cmd_name][0].partition(":")
@@ -96,7 +96,7 @@ def cli(context: click.Context) -> None:
 
 
 def main() -> None:
-    """Run the command line; what went wrong on purpose is said in one line, without a trace."""
+    """Run the command line; print a `MapspeakError` in one line, without a trace."""
     errors: list[MapspeakError] = []
     try:
         with keep_private():

@@ -1,4 +1,4 @@
-"""What is drawn of served robots beside their tools and the live page: RViz, Foxglove, a file."""
+"""Drawings of served robots beside their tools and the live page: RViz, Foxglove, a file."""
 
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import AsyncExitStack

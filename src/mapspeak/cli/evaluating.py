@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from mapspeak.evaluation.trials import TrialResult
 
 TABLE_WIDTH = 180
-"""Characters of the table where nobody knows the width, as in a file."""
+"""Width of the table in characters where the terminal's is unknown, as in a file."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells have it."""
 
 
 def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
-    """Return what stands between the commas, each once."""
+    """Return the parts between the commas, each once."""
     return tuple(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
 
 

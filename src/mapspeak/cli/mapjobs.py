@@ -30,7 +30,7 @@ class MapSelection:
     """The maps that were asked for.
 
     Attributes:
-        names: For each map file a name of its own, made from its path below what was asked for.
+        names: A unique name for each map file, from its path below the given folder.
         is_one_file: True when one file was asked for, and no folder or pattern.
     """
 
@@ -189,7 +189,7 @@ def _digest(path: Path) -> str:
 
 
 class Output(StrEnum):
-    """What can be written about a map; the value ends its file's name in a folder of results."""
+    """An output written for a map; the value ends its file's name in a folder of results."""
 
     PICTURE = ".png"
     FACTS = ".json"
@@ -205,11 +205,11 @@ class MapJob:
 
     Attributes:
         file: The .yaml or the bare picture.
-        name: What it is called among the others.
+        name: Its name among the others.
         resolution_m: The side of a pixel, for a bare picture.
-        anchor: Where on Earth the map lies, if anybody said so.
+        anchor: Where on Earth the map lies, if given.
         outputs: The files to write.
-        start: Where ways are measured from, if they are to be told.
+        start: Where ways are measured from, if they are wanted.
         is_grey_unknown: Takes the grey of unknown for that, whatever the .yaml says.
     """
 

@@ -234,7 +234,7 @@ def _say_sizes(rooms: RoomMap, by_size: list[Region]) -> list[str]:
 
 
 def _find_ways(job: MapJob, loaded: LoadedMap, regions: list[Region]) -> dict[str, str]:
-    """Return how far it is to each region, in words; nothing where nobody asked."""
+    """Return how far it is to each region, in words; nothing unless asked for."""
     if job.start is None:
         return {}
     from mapspeak.ros.discovery.profile import USUAL_RADIUS_M  # noqa: PLC0415

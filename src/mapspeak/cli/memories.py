@@ -1,4 +1,4 @@
-"""Which memory is meant: a file, the usual one of a robot, or a fleet's database."""
+"""The memory to use: a file, the usual one of a robot, or a fleet's database."""
 
 import re
 from pathlib import Path
@@ -72,7 +72,7 @@ def open_store(name: str, *, map_id: str | None = None) -> MemoryStore:
 
 
 def read_places(store: MemoryStore) -> SemanticMap:
-    """Read all places, and say on stderr what is odd about the file."""
+    """Read all places, and report oddities of the file on stderr."""
     places = store.read().present()
     for warning in places.warnings:
         click.echo(f"mapspeak: {warning}", err=True)

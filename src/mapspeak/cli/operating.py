@@ -99,7 +99,7 @@ def hold_robots(
 
 
 def _wait_for_answers(hold: Hold, *, wait_s: float) -> None:
-    """Return when every robot that is served has stopped, or after so long."""
+    """Return when every served robot has stopped, or after a time limit."""
     deadline_s = time.monotonic() + wait_s
     while time.monotonic() < deadline_s:
         if hold.answers() and not hold.unanswered() and not hold.failures():
@@ -149,7 +149,7 @@ Tell = Callable[[str], None]
 
 
 class StopKeys:
-    """What the keys of one terminal do.
+    """The effects of the keys of one terminal.
 
     Args:
         hold: Keeps the robot standing.
@@ -162,7 +162,7 @@ class StopKeys:
         self._is_over = threading.Event()
 
     def press(self, keys: bytes) -> None:
-        """Do what each key says, in their order; other keys do nothing."""
+        """Carry out each key in order; ignore other keys."""
         for key in keys:
             try:
                 if key in STOP:
@@ -178,7 +178,7 @@ class StopKeys:
             pass
 
     def end(self) -> None:
-        """Let whoever waits go on."""
+        """Wake all waiters."""
         self._is_over.set()
 
     def _stop(self) -> None:
@@ -235,7 +235,7 @@ def stop_keys(
 
 
 def _listen(terminal: int, wake: int, keys: StopKeys) -> None:
-    """Hand on what is typed, until woken or the terminal is gone."""
+    """Hand on typed keys, until woken or the terminal is gone."""
     while True:
         ready, _, _ = select.select([terminal, wake], [], [])
         if wake in ready:

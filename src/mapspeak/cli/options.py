@@ -1,4 +1,4 @@
-"""What several commands share: options, the user's folders, and the guard of a served robot."""
+"""Shared by several commands: options, the user's folders, and the guard of a served robot."""
 
 import math
 import os
@@ -87,9 +87,9 @@ def grouped(name: str, make: Callable[..., object], fields: Sequence[str]) -> De
     """Return a decorator that hands some options to a command as one value.
 
     Args:
-        name: Of the argument that takes the value.
-        make: Makes it of the options.
-        fields: The names of the options, and of what they are in the value.
+        name: The argument that takes the value.
+        make: Builds the value from the options.
+        fields: The names of the options, and of their fields in the value.
     """
 
     def group(function: Command) -> Command:
@@ -165,7 +165,7 @@ GUARD_OPTIONS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillChoice:
-    """What `mapspeak serve` was told about skills.
+    """The options of `mapspeak serve` about skills.
 
     Attributes:
         expose: Patterns of names of the robot that are tools.
@@ -178,7 +178,7 @@ class SkillChoice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuardChoice:
-    """What `mapspeak serve` was told about limits.
+    """The options of `mapspeak serve` about limits.
 
     Attributes:
         policy: The file; None for the defaults.
@@ -192,15 +192,15 @@ class GuardChoice:
 
 
 def build_guard(choice: GuardChoice, *, robot: str, address: str = "") -> "Guard":
-    """Build what commands to a robot are held to.
+    """Build the guard of the commands to a robot.
 
     Args:
         choice: Of files.
-        robot: What it is called in the log.
-        address: Where it is; empty for one that nobody else can reach.
+        robot: Its name in the log.
+        address: Where it is; empty for one that no other program can reach.
 
     Raises:
-        ConfigError: The policy has a mistake; says the line and the key.
+        ConfigError: The policy has a mistake; names the line and the key.
     """
     from mapspeak.safety import (  # noqa: PLC0415 - heavy; help must be quick
         Approvals,
@@ -243,7 +243,7 @@ def keep_private() -> Generator[None]:
 
 @contextmanager
 def usual_modes() -> Generator[None]:
-    """Write with the person's own permissions what the person has asked for by name."""
+    """Write a file that the person named with that person's own permissions."""
     umask = _umask_of_person.get()
     if umask is None:
         yield
@@ -256,7 +256,7 @@ def usual_modes() -> Generator[None]:
 
 
 def data_folder() -> Path:
-    """Return the user's folder for what mapspeak keeps."""
+    """Return the user's folder for mapspeak's data."""
     return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "mapspeak"
 
 

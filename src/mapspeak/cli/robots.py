@@ -112,7 +112,7 @@ def file_for(name: str, files: Mapping[str, str]) -> Path | None:
 
 
 def name_for(name: str, given: Mapping[str, str]) -> str | None:
-    """Return what is said for a robot, else for all, else None."""
+    """Return the value for a robot, else for all, else None."""
     return given.get(name, given.get(ONLY))
 
 
@@ -128,7 +128,7 @@ class RobotChoice:
     Attributes:
         robot: "sim", "sim:WORLD", a rosbridge's address, or "ros2" or "dds", each perhaps with a
             domain as in "dds:DOMAIN".
-        robot_file: What is said of it in robot.yaml.
+        robot_file: Its robot.yaml.
         ca_file: For wss.
         seed: Of the simulated robot's noise.
         clock: Of the simulated robot: real or virtual.
@@ -165,7 +165,7 @@ class RobotChoice:
 
     @property
     def address(self) -> str:
-        """Where others reach the same robot; empty for a simulated one, which nobody shares."""
+        """Where others reach the same robot; empty for a simulated one, which is not shared."""
         return "" if _is_simulated(self) else self.shown
 
 
@@ -176,7 +176,7 @@ class ServedRobot:
     Attributes:
         robot: The robot.
         ros: The connection of one that speaks ROS.
-        map_name: Which map or building it drives in; empty where nobody says.
+        map_name: The map or building it drives in; empty where not given.
         skilled: The robot where it has skills of its own.
     """
 
@@ -191,7 +191,7 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
     """Offer the chosen robot while the context lasts.
 
     Raises:
-        ConfigError: There is no such link, or something was asked of it that it has not.
+        ConfigError: There is no such link, or it lacks something that was asked of it.
         LinkError: The robot cannot be reached.
     """
     if _is_simulated(choice):
@@ -231,7 +231,7 @@ def choose_link(choice: RobotChoice) -> "tuple[OpenLink, RobotOverrides]":
     """Return what opens the link to a robot that speaks ROS, and what robot.yaml says.
 
     Raises:
-        ConfigError: There is no such link, or something was asked of it that it has not.
+        ConfigError: There is no such link, or it lacks something that was asked of it.
     """
     from mapspeak.ros.discovery.overrides import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
 
@@ -251,7 +251,7 @@ def choose_link(choice: RobotChoice) -> "tuple[OpenLink, RobotOverrides]":
     overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
     if is_rosbridge:
         return _choose_rosbridge(choice, overrides), overrides
-    # Where ROS is asked for, what is there is taken: rclpy, else DDS without ROS.
+    # For "ros2" take what is installed: rclpy, else DDS without ROS.
     if kind == "ros2" and (find_spec("rclpy") is not None or find_spec("cyclonedds") is None):
         return _choose_ros2(domain, overrides), overrides
     return _choose_dds(domain, overrides), overrides

@@ -55,7 +55,7 @@ SIMULATION = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeOptions:
-    """What `mapspeak serve` was asked for."""
+    """The options of `mapspeak serve`."""
 
     robots: Mapping[str, RobotStart]
     http: str | None
@@ -70,7 +70,7 @@ class ServeOptions:
 
 @dataclass(frozen=True, slots=True)
 class ToolChoice:
-    """Which tools are offered: groups and single ones, as they were named."""
+    """The tools to offer: groups and single ones, as named."""
 
     sets: tuple[str, ...]
     single: tuple[str, ...]
@@ -265,7 +265,7 @@ def _tell_address(what: str, url: str) -> None:
 
 
 def _tell_typist(what: str) -> None:
-    """Tell a person who typed the command that it waits for a program."""
+    """Tell a person in a terminal that the command waits for a client program."""
     if sys.stdin.isatty():
         other = shell_command("serve --http")
         click.echo(

@@ -1,4 +1,4 @@
-"""`mapspeak skills`: check, list and try what the owner of a robot wrote in skills.yaml."""
+"""`mapspeak skills`: check, list and try the skills in the owner's skills.yaml."""
 
 import math
 from collections.abc import AsyncGenerator

@@ -1,4 +1,4 @@
-"""Which robots are served, and what each of them begins with."""
+"""The robots to serve, and the configuration of each."""
 
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
@@ -26,9 +26,9 @@ class RobotStart:
     """One robot as it is to be served.
 
     Attributes:
-        choice: Which robot, and how to reach it.
+        choice: The robot, and how to reach it.
         memory: A file, or the address of a database; None for the usual file.
-        guard: What its commands are held to.
+        guard: The limits of its commands.
     """
 
     choice: RobotChoice
@@ -38,7 +38,7 @@ class RobotStart:
 
 @dataclass(frozen=True, slots=True)
 class RobotOptions:
-    """What may be said for each robot apart, as on the command line: "NAME=..."."""
+    """Options that may differ between robots, as on the command line: "NAME=..."."""
 
     robots: tuple[str, ...]
     robot_files: tuple[str, ...]
@@ -52,12 +52,12 @@ def read_starts(
     """Return each robot as it is to be served, by its name.
 
     Args:
-        given: What may differ between robots.
-        choice: What is the same for all of them.
+        given: Options that may differ between robots.
+        choice: Options that are the same for all of them.
         guard: Likewise.
 
     Raises:
-        ConfigError: Something does not fit together.
+        ConfigError: Some options contradict each other.
     """
     named = name_robots(given.robots)
     files = split_files(given.robot_files, named, "--robot-file")
@@ -89,11 +89,11 @@ async def open_session(
     """Return a session over one robot, and the robot's ROS as it is; both last as its links do.
 
     Args:
-        name: What the operator calls the robot; empty for an only one.
+        name: The operator's name for the robot; empty for an only one.
         start: How it is to be served.
         links: Closes what is opened.
         scratch: A folder for a memory that does not last.
-        lease_s: Without a client for so long, a driving robot is stopped.
+        lease_s: A driving robot is stopped after this time without a client.
     """
     from mapspeak.cli.memories import (  # noqa: PLC0415 - heavy; help must be quick
         keep_usual_memory,

@@ -34,20 +34,20 @@ VIEW_OPTION = click.option(
     f"{DEFAULT_VIEW} unless said otherwise. `mapspeak view` opens one for any running server.",
 )
 LOOK_S = 0.3
-"""Wall time between two looks for somebody who asks for the page."""
+"""Wall time between two checks for requests of the page."""
 WAIT_S = 5.0
 """Wall time until a page that could not be served is tried again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LivePage:
-    """The live page of a server: there from the start, or once somebody asks for it.
+    """The live page of a server: served from the start, or on the first request.
 
     Attributes:
-        feeds: What it shows, by the robot's name.
+        feeds: The feeds it shows, by the robot's name.
         address: Where it is; None for the usual place once it is asked for.
         desk: Where people ask for it.
-        keys: Who may command from it.
+        keys: The people who may command from it.
     """
 
     feeds: "Mapping[str, ViewFeed]"
@@ -78,7 +78,7 @@ class LivePage:
                     task_status.started()
 
             while self.address is None:
-                # That somebody wants to look must never end the server of a robot.
+                # A request for the page must never end the server of a robot.
                 try:
                     where = _find_free(DEFAULT_VIEW)
                     await serve_view(self.feeds, where, keys=self.keys, on_ready=tell)

@@ -1,6 +1,6 @@
-"""A robot that may not be there yet: looked for in the background, and the same to whoever asks.
+"""A robot that may not be there yet: looked for in the background, and shared by all callers.
 
-A link keeps a robot connected that has been there once; what is here waits for the first time.
+A link reconnects a robot that was found once; this module waits for the first time.
 """
 
 import inspect
@@ -19,7 +19,7 @@ from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot import RosRobot
 
 PAUSE_S = 2.0
-"""Between two looks for a robot while nobody asks for it."""
+"""Between two looks for a robot without requests for it."""
 FIRST_LOOK_S = 15.0
 """For how long a call waits for the first look to end, when nothing is known of the robot yet."""
 LOOK_S = 1.0
@@ -94,7 +94,7 @@ class Arrival:
         )
 
     def advertise_early(self) -> None:
-        """Advertise at once what may have to stop the robot, as soon as it is there."""
+        """Advertise the topics that stop the robot as soon as it is there."""
         self._is_early = True
         if self.there is not None:
             self.there.connection.advertise_early()
@@ -110,10 +110,10 @@ class Arrival:
 
 
 class LatePort:
-    """Passes everything on to what implements a port, once that is there.
+    """Passes all calls on to the implementation of a port, once that is there.
 
     Args:
-        select: Returns what implements it, of a robot that is there.
+        select: Returns the implementation, of a robot that is there.
     """
 
     def __init__(self, port: type, arrival: Arrival, select: Callable[[RosRobot], object]) -> None:
@@ -149,7 +149,7 @@ class LateRobot(LatePort):
 
 
 class LateConnection(LatePort):
-    """A `RosConnection` that can be told before it is there what it is for."""
+    """A `RosConnection` whose purpose can be set before it is there."""
 
     @property
     def started(self) -> Started:
@@ -158,5 +158,5 @@ class LateConnection(LatePort):
         return Started() if there is None else there.connection.started
 
     def advertise_early(self) -> None:
-        """Advertise at once, as soon as the robot is there, what may have to stop it."""
+        """Advertise the topics that stop the robot as soon as it is there."""
         self._arrival.advertise_early()

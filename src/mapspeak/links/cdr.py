@@ -20,7 +20,7 @@ from mapspeak.ros.definitions.typestore import NOTHING, describe_field, look_up
 from mapspeak.ros.messages.fields import Message
 
 HEADER_BYTES = 4
-"""They tell the byte order, and stand before what is encoded."""
+"""They tell the byte order and precede the encoded message."""
 MOST_BYTES = 100_000_000
 """The largest message that is read or written; a map of 16 million cells has 16 MB."""
 MOST_MESSAGES = 1_000_000
@@ -76,7 +76,7 @@ class Codec:
         Args:
             type_name: Such as "nav_msgs/OccupancyGrid".
             data: With its header of four bytes.
-            is_exact: Nothing may follow the message: what has more fields is of another version.
+            is_exact: Nothing may follow the message: more fields belong to another version.
         """
         layout = self._find(type_name)
         if len(data) > MOST_BYTES:

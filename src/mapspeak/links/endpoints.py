@@ -1,4 +1,4 @@
-"""Readers and writers in the robot's own network: what their types are called, what they bring."""
+"""Readers and writers in the robot's own network: their type names and samples."""
 
 import re
 from collections.abc import Callable
@@ -23,13 +23,13 @@ def whole_type(part_type: str) -> str:
 
 
 def is_hidden(name: str) -> bool:
-    """Return True for what `ros2 topic list` leaves out, such as the parts of actions."""
+    """Return True for names that `ros2 topic list` leaves out, such as the parts of actions."""
     return "/_" in name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sample:
-    """What one message brings.
+    """One received message.
 
     Attributes:
         content: The message, decoded; None where that failed, or where it is left out.
@@ -47,7 +47,7 @@ Take = Callable[[Sample], None]
 
 
 def understand(data: bytes, decode: Decode, *, source_s: float = 0.0) -> Sample:
-    """Return what the bytes of a message bring."""
+    """Return the sample of a message's bytes."""
     try:
         return Sample(content=decode(data), source_s=source_s)
     except LinkError as error:
@@ -61,7 +61,7 @@ class Endpoint:
     Attributes:
         key: Its id in the network, which no other has.
         type_name: As "package/kind/Type".
-        is_latched: Who comes late gets what was sent last ("transient local").
+        is_latched: A late reader gets the last samples ("transient local").
     """
 
     key: bytes

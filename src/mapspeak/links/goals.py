@@ -1,7 +1,7 @@
 """Goals of actions, as members of a ROS 2 network send them.
 
-An action is three services and two topics. Where answers do not say whom they answer, what is said
-of a goal by its id counts: the list of all goals' states, and feedback.
+An action is three services and two topics. Where answers do not name their request, messages with
+the goal's id count: the list of all goals' states, and feedback.
 """
 
 from collections.abc import Callable, Coroutine, Mapping
@@ -20,12 +20,12 @@ Answer = dict[str, Any]
 
 
 class ServiceClient(Protocol):
-    """What asks one service for us.
+    """The client of one service.
 
     Attributes:
         type_name: As "package/srv/Type".
-        on_answer: Is called with every answer to `post`, and the number of its request; 0 where
-            that is not known.
+        on_answer: Called with every answer to `post`, and the number of its request; 0 where
+            unknown.
     """
 
     service: str
@@ -38,7 +38,7 @@ class ServiceClient(Protocol):
         ...
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
-        """Return when somebody reads our requests."""
+        """Return when the requests have a reader."""
         ...
 
     def encode(self, arguments: Mapping[str, Any]) -> bytes:
@@ -46,7 +46,7 @@ class ServiceClient(Protocol):
         ...
 
     async def call(self, request: bytes, *, timeout_s: float) -> Sample:
-        """Return what the service answers to a request that `encode` gave."""
+        """Return the service's answer to a request from `encode`."""
         ...
 
     def post(self, request: bytes) -> int:
@@ -57,7 +57,7 @@ class ServiceClient(Protocol):
 FINAL = (4, 5, 6)
 """Of action_msgs/GoalStatus: succeeded, cancelled, aborted."""
 SECOND_THOUGHT_S = 0.5
-"""So long an answer may be contradicted by what is said of the goal by its id."""
+"""How long messages with the goal's id may contradict an answer."""
 MOST_RESULTS_HELD = 20
 
 StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
@@ -87,7 +87,7 @@ class ActionWire:
         result.on_answer = self._take_result
 
     async def send_goal(self, action: str, arguments: Message, *, timeout_s: float) -> ActionGoal:
-        """Send a goal; what becomes of it comes later."""
+        """Send a goal; its state follows later."""
         for service in (self._send, self._result, self._cancel):
             await service.wait_for_server(timeout_s=timeout_s)
         goal_id = new_id()
@@ -102,7 +102,7 @@ class ActionWire:
         self._cancel.post(self._cancel.encode({"goal_info": {"goal_id": _uuid(goal_id)}}))
 
     def note_servers(self, keys: list[bytes]) -> None:
-        """Take in who serves the action now; goals are lost with the one that took them."""
+        """Take in the action's present server; goals are lost with the server that took them."""
         if self._server in keys:
             return
         # A server that was started again knows nothing of the goals of the one before.
@@ -131,7 +131,7 @@ class ActionWire:
         self._tell_named()
 
     def take_feedback(self, message: Message) -> None:
-        """Take in what is said of a goal under way."""
+        """Take in the feedback of a goal under way."""
         goal_id = message["goal_id"]["uuid"].hex()
         if goal_id in self._goals:
             self._accept(goal_id)
@@ -144,7 +144,7 @@ class ActionWire:
         try:
             answer = (await self._send.call(request, timeout_s=timeout_s)).content
         except LinkError:
-            # Silence is no refusal: who sent the goal decides how long to wait.
+            # Silence does not refuse a goal: its sender decides how long to wait.
             return
         if not self._send.tells_whom:
             with anyio.move_on_after(SECOND_THOUGHT_S):

@@ -1,4 +1,4 @@
-"""What links have in common that are members of the robot's own network, with nothing between.
+"""The common part of links that are members of the robot's own network, without a bridge.
 
 Messages go as CDR, the encoding of DDS: each link moves bytes, and tells who reads and writes.
 """
@@ -30,9 +30,9 @@ from mapspeak.ros.port import OwnEnds, RosGraph
 
 SEND_GOAL = "/_action/send_goal"
 DEPTH, BULKY_DEPTH = 200, 5
-"""How many messages are kept until we take them."""
+"""Queue depth of a subscription."""
 LISTENER_S = 1.0
-"""For a known listener to be connected to what we advertised."""
+"""Longest wait for a known subscriber to connect to an advertised topic."""
 
 
 class MessageTypes(Protocol):
@@ -52,27 +52,27 @@ class MessageTypes(Protocol):
 
 
 class Writer(Protocol):
-    """What writes on one topic for us."""
+    """The writer of one topic."""
 
     def write(self, data: bytes) -> None:
         """Send the bytes of one message."""
         ...
 
     async def wait_for_reader(self, *, timeout_s: float) -> bool:
-        """Return once somebody reads, or the time is over; tell whether somebody does."""
+        """Wait for a reader until the time is over; return whether there is one."""
         ...
 
 
 @dataclass(slots=True, eq=False)
 class NativeRequest(TopicRequest):
-    """How a topic was asked for, and is read.
+    """The request for a topic, and its reader.
 
     Attributes:
         reader: The link's own; None while the topic is not read.
         quality: The quality of service in which it is read now.
-        writers: The ids of those who wrote it when the reading began.
+        writers: The ids of its writers when the reading began.
         decoded_s: When the last message was decoded, by the monotonic clock.
-        has_learned: Its type was asked for already.
+        has_learned: The robot was asked for its type already.
     """
 
     reader: Any = None
@@ -85,13 +85,13 @@ class NativeRequest(TopicRequest):
 class NativeLink(RosLink[NativeRequest]):
     """Reads and writes topics, calls services, and pursues goals.
 
-    A topic is read only once somebody writes it, because how it can be read depends on who does: a
+    A topic is read only once it has a writer, because the reader's QoS depends on the writer's: a
     reader that asks for more than a writer offers is not served, and one that asks for less misses
     the latched map.
 
     Attributes:
-        reads_anew: A topic is read anew when somebody new writes it.
-        server_s: For somebody who serves to be found: right after opening, not all are known.
+        reads_anew: A topic gets a new reader for each new writer.
+        server_s: Longest wait for a server to be found: right after opening, not all are known.
     """
 
     reads_anew = False
@@ -110,21 +110,21 @@ class NativeLink(RosLink[NativeRequest]):
 
     @property
     def own_ends(self) -> OwnEnds:
-        """Nothing: what such a link tells of the system leaves our own node out."""
+        """Nothing: such a link leaves its own node out of the graph."""
         return OwnEnds()
 
     def clear_the_way(self) -> None:
-        """Do nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+        """Do nothing: ROS 2 itself does not queue messages behind earlier ones."""
 
-    # --- what each link does in its own way
+    # --- implemented by each link
 
     @abstractmethod
     def _writers_of(self, topic: str) -> Sequence[Endpoint]:
-        """Return who writes a topic."""
+        """Return the writers of a topic."""
 
     @abstractmethod
     def _readers_of(self, topic: str) -> Sequence[Endpoint]:
-        """Return who reads a topic, but us."""
+        """Return the readers of a topic, without us."""
 
     @abstractmethod
     def _quality(self, *, is_reliable: bool, is_latched: bool, depth: int) -> Any:  # noqa: ANN401
@@ -156,7 +156,7 @@ class NativeLink(RosLink[NativeRequest]):
 
     @abstractmethod
     async def _service(self, service: str, *, within_s: float) -> ServiceClient:
-        """Return the client of a service that somebody serves."""
+        """Return the client of a service that has a server."""
 
     @abstractmethod
     def _topic_types(self) -> dict[str, str]:
@@ -164,7 +164,7 @@ class NativeLink(RosLink[NativeRequest]):
 
     @abstractmethod
     def _service_types(self) -> Mapping[str, str]:
-        """Return the types of what somebody serves, the parts of actions too."""
+        """Return the types of all services that have a server, the parts of actions too."""
 
     @property
     @abstractmethod
@@ -232,7 +232,7 @@ class NativeLink(RosLink[NativeRequest]):
             self._end_writing(self._advertised.pop(topic)[1])
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publish, once those who are known to listen are connected."""
+        """Publish once the known subscribers are connected."""
         self.announcements.use(topic)
         type_name, writer = self._wanted(topic)
         listeners = self._readers_of(topic)
@@ -268,7 +268,7 @@ class NativeLink(RosLink[NativeRequest]):
             raise wrong_type(topic, min(found), type_name)
 
     def _check_type(self, type_name: str) -> None:
-        """Raise `LinkError` for what is no type."""
+        """Raise `LinkError` for an invalid type."""
         if not TYPE.fullmatch(type_name):
             raise LinkError(
                 f"{type_name[:80]!r} is no type.", hint='Types are written "package/msg/Type".'
@@ -284,7 +284,7 @@ class NativeLink(RosLink[NativeRequest]):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return what a service answers."""
+        """Return the answer of a service."""
         limit_s = self.patience.answer_s if timeout_s is None else timeout_s
         answer = await self._call(service, arguments or {}, type_name=type_name, timeout_s=limit_s)
         content: dict[str, Any] = answer.content
@@ -305,7 +305,7 @@ class NativeLink(RosLink[NativeRequest]):
         return await client.call(client.encode(arguments), timeout_s=timeout_s)
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal to an action and return what becomes of it, as it becomes."""
+        """Send a goal to an action and return the goal, updated as its state changes."""
         check_name(action)
         found = self._action_types().get(action)
         if found not in (None, bare_type(type_name)):
@@ -339,9 +339,9 @@ class NativeLink(RosLink[NativeRequest]):
 
     @abstractmethod
     def _note_servers(self, action: str) -> None:
-        """Tell an action of ours who serves it now."""
+        """Tell an action client its present server."""
 
-    # --- who is there
+    # --- participants
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are."""

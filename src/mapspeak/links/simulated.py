@@ -44,20 +44,21 @@ T = TypeVar("T")
 
 
 class Clock(StrEnum):
-    """What makes a simulated robot's time pass."""
+    """The clock of a simulated robot."""
 
     REAL = "real"
     VIRTUAL = "virtual"
 
 
 class SimulatedRobot:
-    """A `Robot` whose world is computed here. Time passes only while somebody waits.
+    """A `Robot` whose world is computed here.
 
-    One touch of the simulation happens at a time. What has to be computed is, in a worker thread,
-    so that the event loop stays free to answer a stop; what is at hand is read where it is asked.
+    Time passes only while a caller waits. One call works on the simulation at a time. Computation
+    runs in a worker thread, so that the event loop stays free to answer a stop; values at hand are
+    read directly.
 
     Attributes:
-        skills: What it can do besides driving.
+        skills: Its skills besides driving.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class SimulatedRobot:
 
     @property
     def description(self) -> RobotDescription:
-        """What is fixed about this robot."""
+        """The fixed properties of this robot."""
         return RobotDescription(
             name="simulated robot",
             radius_m=BODY_RADIUS_M,
@@ -107,13 +108,13 @@ class SimulatedRobot:
             return StampedPose(self._simulation.pose_in_map, self._simulation.time_s)
 
     async def fetch_picture(self) -> CameraPicture:
-        """Draw what the front camera sees."""
+        """Render the view of the front camera."""
         # Drawing takes long and needs only the pose: a stop must not wait for it.
         async with self._looking:
             return await anyio.to_thread.run_sync(self._take_picture)
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
-        """Return what the simulated detector reports; nothing when it is switched off."""
+        """Return the simulated detector's reports; none when it is switched off."""
         if not self._has_detector:
             return ()
         async with self._looking:
@@ -134,7 +135,7 @@ class SimulatedRobot:
         return None
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Return nothing: nobody else can send this robot anywhere."""
+        """Return nothing: no other client can send this robot anywhere."""
         return ()
 
     async def send_goal(self, goal: Pose) -> str:
@@ -164,7 +165,7 @@ class SimulatedRobot:
         return self._simulation.equipment.charge_ratio
 
     async def compute(self, work: Callable[[], T]) -> T:
-        """Touch the simulation when nobody else does."""
+        """Work on the simulation while no other call does."""
         return await self._run(work)
 
     async def _run(self, work: Callable[[], T]) -> T:
@@ -225,10 +226,10 @@ class PacedRobot(SimulatedRobot):
 
 
 class SoloRobot(SimulatedRobot):
-    """The same robot for a single caller, who does nothing else while it waits.
+    """The same robot for a single caller that does nothing else while it waits.
 
-    To wake a thread for each step costs as much as the step does, and keeps the loop free for
-    nobody.
+    Waking a thread for each step costs as much as the step, and here nothing else needs the event
+    loop.
     """
 
     async def _run(self, work: Callable[[], T]) -> T:
@@ -248,8 +249,8 @@ async def open_simulated_robot(
 
     Args:
         simulation: The world and the robot in it.
-        clock: What makes its time pass.
-        has_detector: Offers what the simulated detector sees.
+        clock: Its clock.
+        has_detector: Offers the simulated detector's reports.
         after_step: Called after each step of the simulation, in its thread.
     """
     if clock is Clock.VIRTUAL:
@@ -263,9 +264,9 @@ async def open_simulated_robot(
 
 
 def _number(robot_goal_id: str) -> int:
-    """Return the simulation's own id; an id of another robot is none of its."""
+    """Return the simulation's own id; an id of another robot is not one of its ids."""
     return int(robot_goal_id) if robot_goal_id.isdecimal() else 0
 
 
 def _do_nothing() -> None:
-    """Stand for the observer that nobody asked for."""
+    """Stand in for an observer."""

@@ -1,4 +1,4 @@
-"""What the simulated robot can do besides driving, as skills: dock, doors, pallets, speech."""
+"""The simulated robot's skills besides driving: dock, doors, pallets, speech."""
 
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ Doing = Callable[["Hands", Arguments, OnProgress], Awaitable[SkillOutcome]]
 
 @dataclass(frozen=True, slots=True)
 class Hands:
-    """What a skill works with: the robot, and the state of what it can use."""
+    """The context of a skill: the robot, and the state of the things it can use."""
 
     robot: "SimulatedRobot"
     equipment: Equipment

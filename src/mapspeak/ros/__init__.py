@@ -1,5 +1,5 @@
-"""THE SECOND PORT: what a ROS system can be asked, over whatever connects us to it.
+"""THE SECOND PORT: the queries and commands to a ROS system, over any connection.
 
-`RosConnection` is to a whole ROS graph what `Robot` is to one robot: links implement it, and what
-works with any ROS robot is written against it. Messages are mappings as rosbridge writes them.
+`RosConnection` is to a whole ROS graph what `Robot` is to one robot: links implement it, and code
+for any ROS robot uses it. Messages are mappings as rosbridge writes them.
 """

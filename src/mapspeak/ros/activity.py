@@ -1,4 +1,4 @@
-"""What goes on over a connection: topics as heard, goals as told of, and what a stop has to end."""
+"""The activity over a connection: subscriptions, goals, and everything that a stop has to end."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class Subscription:
         news.set()
 
     async def wait_for_more_than(self, n_received: int, *, timeout_s: float) -> Message:
-        """Return the latest message once more than so many have come; wait in wall time.
+        """Return the latest message once more than a number have come; wait in wall time.
 
         Raises:
             LinkError: None came in time. The subscription goes on.
@@ -68,7 +68,7 @@ class Subscription:
 
 
 class ActionState(StrEnum):
-    """How a goal of an action stands."""
+    """The state of a goal of an action."""
 
     SENT = "sent"
     ACCEPTED = "accepted"
@@ -110,7 +110,7 @@ REFUSED = ActionEnd(status=None, is_result=False, values="")
 
 
 class ActionGoal:
-    """A goal of ours: what its connection tells of it, and how it stands by all that is heard.
+    """A goal of ours: the connection's news of it, and its state by all news.
 
     Once over its state stays, and only its result may still come.
 
@@ -119,18 +119,19 @@ class ActionGoal:
         ros_id: The id by which the connection knows it at the action server, 32 hex digits of a
             UUID on ROS 2; None where it does not, as over rosbridge.
         is_accepted: The connection says that the server has taken it; rosbridge does not tell.
-        is_lost: What would have brought its end is gone; the robot may still drive.
+        is_lost: The connection or server that would report its end is gone; the robot may still
+            drive.
         end: As the connection has told it.
         feedback: The latest.
         type: Of the action.
         n_seen: How many goals the server had listed before.
-        owner: The client with whom it ends; None where somebody else sees to that.
-        server_id: What the action server calls it; None where that is unknown.
+        owner: The client with whom it ends; None where the caller ends it.
+        server_id: The action server's id of it; None where unknown.
         silent_s: Robot time since the latest feedback, as far as somebody looked.
-        reason: Why it ended so, where that was said.
-        afterwards: What became of a withdrawn goal that the server took after all.
-        is_withdrawn: We said that it was over before the server did: should the server take it,
-            or still have it, it is cancelled.
+        reason: Why it ended so, where known.
+        afterwards: The end of a withdrawn goal that the server took after all.
+        is_withdrawn: We reported it as over before the server did: should the server take it, or
+            still have it, it is cancelled.
         is_settled: The server has ended a withdrawn goal, or never had it.
         sent_s: When it was sent, by the event loop's clock, as are the others.
         heard_s: When the connection last told of it.
@@ -165,7 +166,7 @@ class ActionGoal:
         self._listeners: list[Callable[[], None]] = []
         self._news = anyio.Event()
 
-    # --- what the connection tells
+    # --- news from the connection
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function whenever the connection tells of the goal; it must not raise."""
@@ -237,11 +238,11 @@ class ActionGoal:
         news.set()
 
     async def wait_until_over(self, *, within_s: float) -> bool:
-        """Return at its end, or after so long; True at its end."""
+        """Wait for its end until the time is over; return True at its end."""
         return await self.wait_until(lambda: self.is_over, within_s=within_s)
 
     async def wait_until(self, is_so: Callable[[], bool], *, within_s: float) -> bool:
-        """Return when something has come true of it, or after so long; True when it has."""
+        """Wait until a condition is true of it or the time is over; return whether it is true."""
         with anyio.move_on_after(within_s):
             while not is_so():
                 await self._news.wait()
@@ -262,10 +263,10 @@ class Startable(Protocol):
     async def end(self) -> bool:
         """End every goal of ours, also one that the robot takes only later.
 
-        Returns whether somebody was there to be told; False also where nothing was under way.
+        Returns whether a server was there to be told; False also if nothing was under way.
 
         Raises:
-            LinkError: Says what could not be ended.
+            LinkError: Names the goals that could not be ended.
         """
 
 
@@ -275,8 +276,8 @@ class Started:
     Attributes:
         actions: By name, each with our goals.
         velocities: The zero velocity of each topic on which a velocity was published.
-        n_begun: How often something was begun; zero velocity is not repeated beyond that.
-        n_stops: Grows with every stop; what was wanted before a stop is not begun after it.
+        n_begun: How often a motion was begun; a new one ends the repetition of zero velocity.
+        n_stops: Grows with every stop; a request from before a stop is not begun after it.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What all connections do in the same way: topics are shared by all who ask for them."""
+"""The common part of all connections: callers share the subscription to a topic."""
 
 import os
 from abc import abstractmethod
@@ -23,10 +23,10 @@ PAUSE_S = 0.1
 
 
 class Announcements:
-    """What we have said, or would say, that we publish.
+    """The topics that we have advertised, or would advertise.
 
-    What was told is never taken back for being late: rosbridge shows a publisher for ten seconds
-    more, so that a robot that is not to hear of it must not be told in the first place.
+    Late mode does not take back earlier advertisements: rosbridge shows a publisher for ten seconds
+    more, so a robot that shall not see us as one must not be told at all.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Announcements:
             self.use(topic)
 
     def use(self, topic: str) -> bool:
-        """Tell the robot of a topic before a message; True when it hears of it only now."""
+        """Tell the robot of a topic before a message; return True if it was not told before."""
         if topic not in self._noted or topic in self._told:
             return False
         self._tell(topic, *self._noted[topic])
@@ -81,7 +81,7 @@ class Announcements:
 
 
 async def say_again(say: Callable[[], object]) -> None:
-    """Say what must not be missed for another second: the robot may not listen at once."""
+    """Repeat an important message for another second: the robot may not listen at once."""
     for _ in range(N_AGAIN):
         await anyio.sleep(PAUSE_S)
         with suppress(LinkError):
@@ -90,7 +90,7 @@ async def say_again(say: Callable[[], object]) -> None:
 
 @dataclass(slots=True, eq=False)
 class TopicRequest:
-    """How a topic was asked for; each link adds how it is read."""
+    """The request for a topic; each link adds its reader."""
 
     subscription: Subscription
     is_bulky: bool
@@ -102,7 +102,7 @@ Request = TypeVar("Request", bound=TopicRequest)
 
 
 class RosLink(ParameterServices, Generic[Request]):
-    """The part of the port that is the same over every connection; it raises what the port says."""
+    """The common part of the port over every connection; it raises the errors of the port."""
 
     def __init__(self, request_type: type[Request], patience: Patience) -> None:
         self.patience = patience
@@ -119,7 +119,7 @@ class RosLink(ParameterServices, Generic[Request]):
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> Subscription:
-        """Return the subscription to a topic; the first who asks decides how often it is heard."""
+        """Return the subscription to a topic; its first request sets the throttling."""
         request = self.requests.get(topic)
         if request is None:
             self._check(topic, type_name)
@@ -154,11 +154,11 @@ class RosLink(ParameterServices, Generic[Request]):
         self.announcements.advertise(topic, type_name, is_latched=is_latched)
 
     def unadvertise(self, topic: str) -> None:
-        """Take back what `advertise` said."""
+        """Take back an advertisement."""
         self.announcements.unadvertise(topic)
 
     def advertise_late(self) -> None:
-        """Tell the robot of what is advertised from now on only with the first message there."""
+        """Tell the robot of each topic advertised from now on only with its first message."""
         self.announcements.be_late()
 
     def advertise_early(self) -> None:
@@ -178,7 +178,7 @@ class RosLink(ParameterServices, Generic[Request]):
         """Run something in the background until the connection is closed."""
 
     def _check(self, topic: str, type_name: str | None) -> None:
-        """Raise `LinkError` where a name or a type is none, or do not go with the other."""
+        """Raise `LinkError` where a name or a type is invalid, or the two contradict each other."""
 
     @abstractmethod
     def _begin(self, request: Request) -> None:
@@ -198,7 +198,7 @@ class RosLink(ParameterServices, Generic[Request]):
 
     @abstractmethod
     def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
-        """Return what publishes a message to those who are connected; it tells by how many ways."""
+        """Return a function that publishes over each open connection and returns their number."""
 
 
 def check_name(name: str) -> None:

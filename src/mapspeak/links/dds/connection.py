@@ -42,14 +42,14 @@ from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 logger = logging.getLogger(__name__)
 
 FIRST_SIGN_S = 5.0
-"""For the first node of ROS to be found."""
+"""Longest wait for the first ROS node to be found."""
 QUIET_S = 0.4
-"""Without anybody new, after which all who are there count as found."""
+"""Time without a new participant, after which discovery counts as complete."""
 LONGEST_LOOK_S = 3.0
 ARRIVAL_S = 0.5
-"""For what was published last to arrive, before we leave."""
+"""Wait for the last publications to arrive before leaving."""
 TIME_S = 2.0
-"""For a node to tell the time."""
+"""Longest wait for a node to tell the time."""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 30.0
 """Before a node that did not tell a type is asked for it again."""
 ASKED_FOR_TIME = "/get_parameter_types"
@@ -67,8 +67,8 @@ HINT = (
 class DdsConnection(NativeLink):
     """One ROS 2 system, as a member of its DDS domain sees it.
 
-    A topic is read anew when somebody new writes it: Fast DDS serves at once a reader that comes
-    after its writer, and may take three seconds to serve one that was there before.
+    A topic gets a new reader for each new writer: Fast DDS serves a reader that comes after its
+    writer at once, and may take three seconds to serve an earlier one.
 
     Args:
         framing_of: Tells how a node frames services, by the id of its writer.
@@ -119,17 +119,17 @@ class DdsConnection(NativeLink):
             self._tasks.start_soon(work)
 
     async def start(self, tasks: TaskGroup) -> None:
-        """Enter the domain, and return when those who are there have been found.
+        """Enter the domain, and return when its participants have been found.
 
         Raises:
-            LinkError: Nobody is there.
+            LinkError: The domain is empty.
         """
         self._tasks = tasks
         self._participant.watch_endpoints(self.discovery.take_writer, self.discovery.take_reader)
         tasks.start_soon(self._participant.run)
         await self.wait_until_connected()
-        # Fast DDS sends what is latched at once to a reader that knows the writer already, and
-        # otherwise within three seconds. So no topic is read before somebody is there.
+        # Fast DDS sends latched samples at once to a reader that knows the writer already, and
+        # otherwise within three seconds. So no topic is read before a writer is found.
         self._participant.read(
             DISCOVERY_TOPIC,
             DISCOVERY_TYPE,
@@ -145,7 +145,7 @@ class DdsConnection(NativeLink):
                 is_news = not quiet.cancelled_caught
 
     async def aclose(self) -> None:
-        """Leave the domain, once what was published last has arrived."""
+        """Leave the domain once the last publications have arrived."""
         if self._advertised:
             await self._participant.flush(timeout_s=ARRIVAL_S)
         self._participant.close()
@@ -271,7 +271,7 @@ class DdsConnection(NativeLink):
         servers = self.discovery.writers_of(reply_topic(action + SEND_GOAL))
         self._actions[action].note_servers([each.key for each in servers])
 
-    # --- who is there
+    # --- participants
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are."""
@@ -293,7 +293,7 @@ class DdsConnection(NativeLink):
         return tuple(sorted(self.discovery.nodes))
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Return what a node publishes, subscribes to and serves."""
+        """Return the topics and services that a node publishes, subscribes to and serves."""
         keys = self.discovery.nodes.get(node)
         if keys is None:
             raise unknown(node)
@@ -358,7 +358,7 @@ async def open_dds_connection(
     """Keep us in a domain while the context lasts; see `DdsConnection`.
 
     Raises:
-        LinkError: DDS cannot be started, or nobody is there.
+        LinkError: DDS cannot be started, or the domain is empty.
     """
     with plain_errors():
         async with anyio.create_task_group() as tasks:
@@ -381,7 +381,7 @@ async def open_dds_robot(
 ) -> AsyncGenerator[RosRobot]:
     """Offer the ROS 2 robot in a DDS domain while the context lasts.
 
-    Leaving the context does not stop the robot: call `stop` before, where that is wanted.
+    Leaving the context does not stop the robot: call `stop` before if wanted.
 
     Raises:
         LinkError: No robot is found there, or it does not say what it offers.

@@ -1,4 +1,4 @@
-"""Who is in the domain: readers and writers as DDS tells of them, and nodes as ROS does."""
+"""The participants of the domain: readers and writers from DDS, nodes from ROS."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -28,7 +28,7 @@ UNNAMED = "/_NODE_NAME_UNKNOWN_"
 
 
 class Framing(Enum):
-    """What precedes a service's request and answer."""
+    """The header before a service's request and answer."""
 
     BARE = auto()
     NUMBERED = auto()
@@ -56,7 +56,7 @@ def framing_by_vendor(key: bytes) -> Framing:
 
 
 class Discovery:
-    """Keeps who is there, without ourselves.
+    """Keeps the participants of the domain, without our own.
 
     Args:
         on_change: Is called with the DDS topic whose readers or writers have changed.
@@ -76,14 +76,14 @@ class Discovery:
         self.has_long_ids = False
         """True for Humble and before."""
 
-    # --- what comes
+    # --- incoming samples
 
     def take_writer(self, sample: Sample) -> None:
-        """Take in what DDS says of a writer."""
+        """Take in DDS discovery data of a writer."""
         self._take(sample.content, self._writers)
 
     def take_reader(self, sample: Sample) -> None:
-        """Take in what DDS says of a reader."""
+        """Take in DDS discovery data of a reader."""
         self._take(sample.content, self._readers)
 
     def take_nodes(self, sample: Sample) -> None:
@@ -115,14 +115,14 @@ class Discovery:
         news.set()
 
     async def wait_for_news(self) -> None:
-        """Return when somebody has come or gone."""
+        """Return when a participant has come or gone."""
         await self._news.wait()
 
-    # --- what is known
+    # --- the known graph
 
     @property
     def is_empty(self) -> bool:
-        """True when nobody of ROS is there."""
+        """True without any ROS node."""
         return not self._writers
 
     def writers_of(self, topic: str) -> list[DdsEndpoint]:
@@ -158,7 +158,7 @@ class Discovery:
 
     @property
     def services(self) -> dict[str, DdsEndpoint]:
-        """Who answers each service, those that are parts of actions too."""
+        """The servers of each service, those that are parts of actions too."""
         found: dict[str, DdsEndpoint] = {}
         for each in self._writers.values():
             service = service_of(each.topic)
@@ -167,7 +167,7 @@ class Discovery:
         return found
 
     def server_of(self, service: str) -> DdsEndpoint | None:
-        """Return who answers a service; None where nobody does."""
+        """Return the server of a service; None where there is none."""
         return next(iter(self.writers_of(reply_topic(service))), None)
 
     @property
@@ -181,7 +181,7 @@ class Discovery:
         return found
 
     def links_of(self, keys: tuple[bytes, ...]) -> NodeLinks:
-        """Return what the node with these readers and writers does."""
+        """Return the topics and services of the node with these readers and writers."""
         written = [self._writers[key].topic for key in keys if key in self._writers]
         read = [self._readers[key].topic for key in keys if key in self._readers]
         return NodeLinks(

@@ -1,4 +1,4 @@
-"""The names of ROS in DDS, and what discovery tells of DataWriters and DataReaders."""
+"""The names of ROS in DDS, and the discovery data of DataWriters and DataReaders."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +49,7 @@ def reply_topic(service: str) -> str:
 
 
 def topic_of(dds_name: str) -> str | None:
-    """Return "/map" for "rt/map"; None for what is no topic of ROS."""
+    """Return "/map" for "rt/map"; None for a topic that is not of ROS."""
     return dds_name[len(TOPIC) :] if dds_name.startswith(f"{TOPIC}/") else None
 
 
@@ -92,8 +92,8 @@ class Quality:
     """The part of DDS's quality of service that ROS uses most.
 
     Attributes:
-        is_reliable: What is lost is sent again.
-        is_latched: Who comes late gets what was sent last ("transient local").
+        is_reliable: Lost samples are sent again.
+        is_latched: A late reader gets the last samples ("transient local").
     """
 
     is_reliable: bool
@@ -127,7 +127,7 @@ class RawReader:
         self.take = take
 
     def collect(self) -> list[Any]:
-        """Take what has come from DDS; nothing once closed."""
+        """Take the samples that have arrived; none once closed."""
         if self._reader is None:
             return []
         try:
@@ -188,7 +188,7 @@ class RawWriter:
         news.set()
 
     async def wait_for_reader(self, *, timeout_s: float) -> bool:
-        """Return once somebody reads, or the time is over; tell whether somebody does."""
+        """Wait for a reader until the time is over; return whether there is one."""
         with anyio.move_on_after(timeout_s):
             while not self.n_matched:
                 await self._news.wait()

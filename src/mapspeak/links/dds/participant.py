@@ -1,4 +1,4 @@
-"""Our member of a DDS domain: what it reads and writes, as bytes, and the thread that listens.
+"""Our member of a DDS domain: its readers and writers of bytes, and the thread that listens.
 
 DDS wakes no event loop, so one thread waits for all readers. It decodes, which may take a while for
 a picture, and hands over to the event loop, and waits until that has taken it: where the loop is
@@ -58,7 +58,7 @@ class DdsNetwork:
         is_local: Members are on this machine only, as with
             ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST.
         peers: Addresses of other machines that multicast does not reach, as in ROS_STATIC_PEERS.
-        cyclonedds_uri: What else Cyclone DDS is told, as in CYCLONEDDS_URI.
+        cyclonedds_uri: Further settings of Cyclone DDS, as in CYCLONEDDS_URI.
     """
 
     domain_id: int = 0
@@ -117,7 +117,7 @@ class DdsParticipant:
 
     @property
     def key(self) -> bytes:
-        """What is common to the ids of all our readers and writers: twelve bytes."""
+        """The common prefix of the ids of all our readers and writers: twelve bytes."""
         return bytes(self._participant.guid.bytes[:12])
 
     def watch_endpoints(self, take_writer: Take, take_reader: Take) -> None:
@@ -137,9 +137,9 @@ class DdsParticipant:
         Args:
             topic: As DDS names it, such as rt/map.
             type_name: As ROS names it, such as "nav_msgs/msg/OccupancyGrid".
-            quality: What is asked of the writers; one that offers less is not heard.
-            decode: Is called in another thread.
-            take: Is called in the event loop.
+            quality: The QoS asked of the writers; one that offers less does not match.
+            decode: Called in another thread.
+            take: Called in the event loop.
         """
         try:
             known, _ = self._topic(topic, type_name)

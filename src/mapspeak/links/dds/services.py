@@ -28,11 +28,11 @@ NUMBER = struct.Struct("<Qq")
 MOST_AT_ONCE = 8
 """Calls of one service: its node keeps ten requests and forgets the oldest."""
 LATE_ANSWER_S = 1.0
-"""So long an answer is held that may belong to an earlier call, which was given up."""
+"""How long to hold an answer that may belong to an earlier call, which was given up."""
 
 
 class _Call:
-    """One request of ours under way, and what was answered while it was."""
+    """One request under way, and the answers that came meanwhile."""
 
     def __init__(self, n_before: int) -> None:
         self.n_before = n_before
@@ -69,13 +69,13 @@ class DdsService:
         self._framing = framing
         self._types = types
         self.on_answer: Callable[[int, Answer], None] | None = None
-        """Is called with every answer, and the number of its request; 0 where that is not known."""
+        """Called with every answer, and the number of its request; 0 where unknown."""
         self._id = int(new_id()[:16], 16)
         self._number = 0
         self._n_open = 0
         self._turns = anyio.CapacityLimiter(MOST_AT_ONCE if self.tells_whom else 1)
         self._calls: dict[int, _Call] = {}
-        # Who reads our requests must know our reader by then: it is announced first.
+        # The server must know our reader before it reads a request, so this is announced first.
         self._raw_reader = participant.read(
             reply_topic(service),
             self._reply_type,
@@ -88,7 +88,7 @@ class DdsService:
         )
 
     async def call(self, request: bytes, *, timeout_s: float) -> Sample:
-        """Return what the service answers to a request that `encode` gave."""
+        """Return the service's answer to a request from `encode`."""
         deadline_s = anyio.current_time() + timeout_s
         await self.wait_for_server(timeout_s=timeout_s)
         with anyio.move_on_at(deadline_s):
@@ -97,7 +97,7 @@ class DdsService:
         raise self._silence(timeout_s)
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
-        """Return when somebody reads our requests."""
+        """Return when the requests have a reader."""
         if not await self._raw_writer.wait_for_reader(timeout_s=timeout_s):
             raise nobody_serves(self.service)
 
@@ -107,7 +107,7 @@ class DdsService:
         return self._framing is Framing.NUMBERED
 
     def note_server(self, framing: Framing | None) -> None:
-        """Take in who serves now, or that nobody does, whose answers will never come."""
+        """Take in the framing of the present server; without one, open answers will never come."""
         if framing is None:
             self._n_open = 0
         else:
@@ -142,7 +142,7 @@ class DdsService:
                     await call.is_answered.wait()
         finally:
             del self._calls[number]
-        # What was held is ours after all where nothing followed: the earlier call had no answer.
+        # A held answer is ours if no other followed: the earlier call had no answer.
         found = call.answer or call.held
         if found is None:
             raise self._silence(timeout_s)

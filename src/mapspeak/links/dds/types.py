@@ -1,4 +1,4 @@
-"""What types look like over DDS: described by the robot, or known to us by their hash."""
+"""Type definitions over DDS: described by the robot, or known to us by their hash."""
 
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -91,7 +91,8 @@ class Types:
     """Encodes and decodes, after the definitions known so far.
 
     Args:
-        distro: Of ROS 2, whose definitions count until the robot tells; see `known_definitions`.
+        distro: Of ROS 2; its definitions count until the robot describes types; see
+            `known_definitions`.
     """
 
     def __init__(self, *, distro: str = "") -> None:
@@ -167,7 +168,7 @@ class Types:
             self._use(TypeBook({**self._book.texts, **texts}))
 
     def take_description(self, answer: Message) -> None:
-        """Take in what a node says of a type."""
+        """Take in a node's description of a type."""
         texts = read_type_description(answer)
         self._other_versions -= texts.keys()
         self._use(TypeBook({**self._book.texts, **texts}))

@@ -33,7 +33,7 @@ QUIET_S = 0.3
 """Without anything new, after which all that is there counts as found."""
 LONGEST_LOOK_S = 3.0
 WATCH_S = 0.2
-"""Between two looks at who reads and writes what."""
+"""Between two looks at the graph of readers and writers."""
 HINT = (
     "Check that the robot runs ROS 2, that its ROS_DOMAIN_ID and RMW_IMPLEMENTATION are those of "
     "mapspeak (--robot ros2:DOMAIN), and that `ros2 node list` on this machine shows it."
@@ -67,7 +67,7 @@ class Ros2Connection(NativeLink):
 
     @property
     def is_open(self) -> bool:
-        """True: who reads what we publish is another matter."""
+        """True, with or without subscribers to our topics."""
         return True
 
     @property
@@ -80,14 +80,14 @@ class Ros2Connection(NativeLink):
         self._tasks.start_soon(work)
 
     async def start(self) -> None:
-        """Return when those who are there have been found; also when nobody is."""
+        """Return when the participants have been found, or there are none."""
         self._tasks.start_soon(self._watch)
         if await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
             with anyio.move_on_after(LONGEST_LOOK_S):
                 await wait_until_quiet(self)
 
     async def aclose(self) -> None:
-        """Wait a moment until what was published last has arrived."""
+        """Wait a moment until the last publications have arrived."""
         for _, writer in self._advertised.values():
             await anyio.to_thread.run_sync(writer.flush)
 
@@ -134,7 +134,7 @@ class Ros2Connection(NativeLink):
         find_message(type_name)
 
     def _learn(self, request: NativeRequest) -> None:
-        """Raise `LinkError`: what is not installed here cannot be learned."""
+        """Raise `LinkError`: a type that is not installed here cannot be learned."""
         topic = request.subscription.topic
         for writer in self._writers_of(topic):
             find_message(writer.type_name)
@@ -171,7 +171,7 @@ class Ros2Connection(NativeLink):
         if keys or not self._services[f"{action}/_action/send_goal"].is_served:
             self._actions[action].note_servers(keys)
 
-    # --- who is there
+    # --- participants
 
     async def fetch_time_s(self) -> float | None:
         """Return the time of this machine: the machines of a ROS 2 system have the same."""
@@ -192,7 +192,7 @@ class Ros2Connection(NativeLink):
         return tuple(sorted(names))
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Return what a node publishes, subscribes to and serves."""
+        """Return the topics and services that a node publishes, subscribes to and serves."""
         namespace, _, name = node.rpartition("/")
         ours = self._participant.node
         if node not in self.nodes():
@@ -228,7 +228,7 @@ class Ros2Connection(NativeLink):
         }
 
     def _service_types(self) -> dict[str, str]:
-        """Return the types of what somebody serves: a mere client shows as a service too."""
+        """Return the types of services that have a server: a mere client shows as a service too."""
         node, ours = self._participant.node, f"/{self._participant.name}/"
         return {
             service: types[0]
@@ -238,7 +238,7 @@ class Ros2Connection(NativeLink):
 
     def _is_of_others(self, topic: str) -> bool:
         node = self._participant.node
-        # One after the other: most topics have somebody who writes them.
+        # One after the other: most topics have a publisher.
         return bool(
             self._nodes_of(node.get_publishers_info_by_topic(topic))
             or self._nodes_of(node.get_subscriptions_info_by_topic(topic))
@@ -254,9 +254,9 @@ class Ros2Connection(NativeLink):
 
     async def _watch(self) -> None:
         while True:
-            # What ROS cannot tell now, it is asked again.
+            # What ROS cannot tell now is asked again.
             for request in list(self.requests.values()):
-                # What cannot be read stays silent; who waits for it is told so.
+                # An unreadable topic stays silent; its subscribers are told so.
                 with suppress(LinkError), errors_of_ros("ROS does not tell who writes"):
                     self._begin(request)
             for action in list(self._actions):
@@ -265,10 +265,7 @@ class Ros2Connection(NativeLink):
             await anyio.sleep(WATCH_S)
 
     def _sees_others(self) -> bool:
-        """Return True once somebody has been there.
-
-        Who goes later is found out by what stays silent.
-        """
+        """Return True once a participant was found. Silent topics show later losses."""
         if self._found_s is None and self.nodes():
             self._found_s = anyio.current_time()
         return self._found_s is not None
@@ -289,14 +286,14 @@ def _shown(found: Iterable[tuple[str, Any]]) -> tuple[str, ...]:
 
 
 class RclpyContext(Protocol):
-    """What can be asked of a system that is still being found."""
+    """The queries to a system that is still being found."""
 
     def nodes(self) -> tuple[str, ...]:
         """Return the full names of all nodes that are known now."""
         ...
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Return what a node does."""
+        """Return the topics and services of a node."""
         ...
 
     async def fetch_graph(self) -> RosGraph:
@@ -305,7 +302,7 @@ class RclpyContext(Protocol):
 
 
 async def wait_until_quiet(system: RclpyContext) -> None:
-    """Return when nothing new comes, and no node is a mere name: what it does comes later."""
+    """Return when nothing new comes, and every node has endpoints: these come after its name."""
     graph, before = await system.fetch_graph(), None
     while graph != before or not await _shows_all_nodes(system):
         await anyio.sleep(QUIET_S)

@@ -1,4 +1,4 @@
-"""What reads, writes and asks for us over rclpy, all of it in bytes."""
+"""Readers, writers and service clients over rclpy, all of them in bytes."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -15,9 +15,9 @@ from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wa
 from mapspeak.links.rclpy.types import RclpyTypes, find_message
 
 YOUNG_S = 0.5
-"""A listener that we know of may hear of us that much later, and miss what was published before."""
+"""A known subscriber may discover us this much later, and miss earlier messages."""
 ARRIVAL_S = 0.5
-"""For what was published last to arrive, before we leave."""
+"""Wait for the last publications to arrive before leaving."""
 
 
 class RclpyReader:
@@ -42,7 +42,7 @@ class RclpyReader:
             )
 
     def close(self) -> None:
-        """Read no longer; what rclpy still brings is dropped."""
+        """Stop reading; drop later messages from rclpy."""
         self._is_open = False
         self._participant.node.destroy_subscription(self._subscription)
 
@@ -78,7 +78,7 @@ class RclpyWriter:
             self._publisher.publish(data)
 
     async def wait_for_reader(self, *, timeout_s: float) -> bool:
-        """Return once somebody reads, or the time is over; tell whether somebody does."""
+        """Wait for a reader until the time is over; return whether there is one."""
         count = self._publisher.get_subscription_count
         is_read = await wait_until(lambda: bool(count()), within_s=timeout_s)
         await anyio.sleep_until(self._made_s + YOUNG_S)
@@ -113,11 +113,11 @@ class RclpyService:
 
     @property
     def is_served(self) -> bool:
-        """True while somebody answers."""
+        """True while the service has a server."""
         return bool(self._client.service_is_ready())
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
-        """Return when somebody reads our requests."""
+        """Return when the service has a server."""
         if not await wait_until(lambda: self.is_served, within_s=timeout_s):
             raise nobody_serves(self.service)
 
@@ -126,7 +126,7 @@ class RclpyService:
         return self._types.encode(f"{self.type_name}_Request", arguments)
 
     async def call(self, request: bytes, *, timeout_s: float) -> Sample:
-        """Return what the service answers; a call that is not answered in time is forgotten."""
+        """Return the service's answer; forget a call that is not answered in time."""
         future = self._send(request)
         try:
             with anyio.move_on_after(timeout_s):

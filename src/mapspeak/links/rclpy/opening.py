@@ -29,9 +29,9 @@ async def open_ros2_connection(
     """Keep a node of ours in a ROS 2 domain while the context lasts.
 
     Args:
-        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
+        domain_id: As in ROS_DOMAIN_ID; None takes that variable's value.
         distro: Such as "jazzy"; empty where that is unknown.
-        variables: Stand before those of the environment while the domain is entered.
+        variables: Override those of the environment while the domain is entered.
 
     Raises:
         ConfigError: This Python has no rclpy.

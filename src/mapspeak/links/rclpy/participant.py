@@ -25,21 +25,21 @@ LOG = logging.getLogger(__name__)
 N_DIGITS = 8
 """Of the id in our node's name; two of the same name in one domain would be taken for one."""
 LOOK_S = 0.02
-"""Between two looks at what rclpy does not tell by itself."""
+"""Polling interval for facts that rclpy has no event for."""
 PAUSE_S = 0.2
 """After an error of rclpy, so that one that stays does not fill the log."""
 
 Node = Any  # rclpy has no types
 ERRORS = (RuntimeError, OverflowError, NameValidationException, NoTypeSupportImportedException)
-"""What rclpy raises; what ROS's own library says is a RuntimeError."""
+"""The errors that rclpy raises; those of ROS's own library are RuntimeErrors."""
 
 
 class RclpyParticipant:
     """A node, in a context of its own, whose callbacks a thread of its own runs.
 
     Args:
-        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
-        variables: Stand before those of the environment while the domain is entered.
+        domain_id: As in ROS_DOMAIN_ID; None takes that variable's value.
+        variables: Override those of the environment while the domain is entered.
     """
 
     def __init__(
@@ -81,10 +81,10 @@ class RclpyParticipant:
             await anyio.to_thread.run_sync(self._leave)
 
     def hand_over(self, work: Callable[..., None], *arguments: Any) -> None:  # noqa: ANN401
-        """Let the event loop do something, and wait until it has.
+        """Call a function in the event loop, and wait for its return.
 
-        That one waits keeps a fast robot from filling our memory: what comes meanwhile is left to
-        ROS, which keeps the newest few messages of each topic.
+        Waiting keeps a fast robot from filling our memory: messages that come meanwhile are left to
+        ROS, which keeps the newest few of each topic.
         """
         if threading.get_ident() == self._loop_thread:
             work(*arguments)
@@ -92,7 +92,7 @@ class RclpyParticipant:
         try:
             self._portal.call(work, *arguments)
         except (CancelledError, RuntimeError):
-            # While we leave nobody takes it any more.
+            # The event loop takes no more work while we leave.
             if not self._pause.is_set():
                 raise
 
@@ -140,7 +140,7 @@ class RclpyParticipant:
 
 
 async def wait_until(is_so: Callable[[], bool], *, within_s: float) -> bool:
-    """Return whether something is so, as soon as it is, and at last after so long."""
+    """Wait until a condition is true or the time is over; return whether it is true."""
     with anyio.move_on_after(within_s):
         while not is_so():  # noqa: ASYNC110 - rclpy has no event for it
             await anyio.sleep(LOOK_S)
@@ -149,7 +149,7 @@ async def wait_until(is_so: Callable[[], bool], *, within_s: float) -> bool:
 
 @contextmanager
 def errors_of_ros(what: str) -> Iterator[None]:
-    """Turn what rclpy raises into a `LinkError`."""
+    """Turn errors of rclpy into a `LinkError`."""
     try:
         yield
     except ERRORS as error:

@@ -28,13 +28,13 @@ FIELD = re.compile(
 )
 TEXT = re.compile(r"(?P<text>w?string)<(?P<most>\d+)>")
 DEFINED_AS = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
-"""As .msg files name what rclpy names as IDL does."""
+"""Names of .msg files for rclpy's IDL names."""
 IN_ACTION = {
     "_SendGoal": "SendGoalService",
     "_GetResult": "GetResultService",
     "_FeedbackMessage": "FeedbackMessage",
 }
-"""Where rclpy keeps the classes of an action's parts."""
+"""The attributes in which rclpy keeps the classes of an action's parts."""
 
 
 class RclpyTypes:
@@ -61,7 +61,7 @@ class RclpyTypes:
         return self._find(type_name).decode(type_name, data, is_exact=False)
 
     def _find(self, type_name: str) -> Codec:
-        """Return what encodes a type; rclpy's thread and the event loop may meet one at once."""
+        """Return the encoder of a type; rclpy's thread and the event loop may call at once."""
         if self._book.knows(type_name):
             return self._codec
         whole = whole_type(type_name)
@@ -118,7 +118,7 @@ def find_message(type_name: str, kind: str = "msg") -> RosClass:
     """Return the class of a type of messages, or of another kind: "srv" or "action".
 
     Raises:
-        LinkError: The name is none, or this Python does not have the type.
+        LinkError: The name is invalid, or this Python does not have the type.
     """
     found = find_class(type_name, kind)
     if found is not None:
@@ -151,10 +151,7 @@ def find_class(type_name: str, kind: str) -> RosClass | None:
 
 @cache
 def _has_types(package: str, kind: str) -> bool:
-    """Return True for a package that ROS made.
-
-    A name that somebody gives must import nothing else.
-    """
+    """Return True for a package that ROS made. A given name must not import anything else."""
     spec = find_spec(package)
     folders = [] if spec is None else spec.submodule_search_locations or []
     return any(

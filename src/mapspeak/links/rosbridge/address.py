@@ -1,4 +1,4 @@
-"""Where a rosbridge is, and what it wants to see before it talks."""
+"""The address of a rosbridge, and the credentials that it asks for."""
 
 import re
 import ssl
@@ -15,7 +15,7 @@ from mapspeak.ros.port import LinkKind, LinkName
 
 DEFAULT_PORT = 9090
 SECRET_KEY = re.compile("token|key|auth|pass|secret|sig", re.IGNORECASE)
-"""Of a query: what changes without the robot becoming another one."""
+"""Parts of a query that change without naming another robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,13 +23,13 @@ class RobotAddress:
     """A rosbridge server.
 
     Attributes:
-        url: ws://host:9090 or wss://host:9090; without a port, 9090 is meant.
+        url: ws://host:9090 or wss://host:9090; the default port is 9090.
         headers: Sent with the first request, such as {"Authorization": "Bearer ..."}.
         token: Given in rosbridge's own `auth` operation, for servers that want it.
         ca_file: Whose certificates a wss server may show; None trusts the system's.
 
     Raises:
-        ConfigError: The URL is none, or there is no such file.
+        ConfigError: The URL is invalid, or there is no such file.
     """
 
     url: str = field(repr=False)
@@ -53,7 +53,7 @@ class RobotAddress:
 
     @property
     def link(self) -> LinkName:
-        """How one who is connected to it says so."""
+        """The name of a connection to it."""
         return LinkName(LinkKind.ROSBRIDGE, self.shown)
 
     @property
@@ -70,7 +70,7 @@ class RobotAddress:
         return f"{'wss' if uri.secure else 'ws'}://{host}:{uri.port}{digest}"
 
     def build_ssl_context(self) -> ssl.SSLContext | None:
-        """Return what decides whether a wss server is the right one; None for ws.
+        """Return the TLS context that verifies a wss server; None for ws.
 
         Raises:
             ConfigError: The CA file cannot be read.
@@ -87,7 +87,7 @@ class RobotAddress:
 
 
 def quote_address(text: str) -> str:
-    """Return what was given as an address in quotes, unless a part of it may be a secret."""
+    """Return the given address in quotes, unless a part of it may be a secret."""
     return "What was given" if {"@", "?", "#"} & set(text) else repr(text[:80])
 
 

@@ -30,10 +30,10 @@ SERVICE_HINT = (
 
 
 class Channel:
-    """A connection that comes back by itself.
+    """A connection that reconnects by itself.
 
     Args:
-        on_event: Called with what the server says, answers to calls apart.
+        on_event: Called with the server's events, except answers to calls.
         on_loss: Called with this channel when a connection has died or been replaced.
     """
 
@@ -61,7 +61,7 @@ class Channel:
         """The latest loss was our own doing: the robot and its rosbridge went on."""
         self._fault_pause_s = 0.0
         self.n_connections = 0
-        """How often it has been connected; more than one means that it was lost in between."""
+        """How often it was connected; more than one means that it was lost in between."""
 
     @property
     def is_up(self) -> bool:
@@ -123,7 +123,7 @@ class Channel:
         (await self._wait_for_connection(timeout_s)).send(text)
 
     async def call(self, text: bytes, *, call_id: str, what: str, timeout_s: float) -> object:
-        """Return what a service answers."""
+        """Return the answer of a service."""
         deadline_s = anyio.current_time() + timeout_s
         connection = await self._wait_for_connection(timeout_s)
         n_answers = connection.n_answers
@@ -165,11 +165,11 @@ class Channel:
             await self._connect_again(tasks, fault=self._connection.fault)
 
     async def _connect_again(self, tasks: TaskGroup, *, fault: str) -> None:
-        """Try again and again, with longer and longer pauses.
+        """Reconnect until it succeeds, with longer and longer pauses.
 
         Args:
             tasks: Where the new connection is served.
-            fault: What the other end did to the last one; an end that does so gets its pauses too.
+            fault: The other end's protocol fault in the last one; such an end gets its pauses too.
         """
         pause_s = self._pause_after(self._fault_pause_s) if fault else 0.0
         self._fault_pause_s = pause_s
@@ -182,7 +182,7 @@ class Channel:
             )
         while True:
             with anyio.move_on_after(pause_s):
-                # Whoever waits for the robot learns at once whether it is back.
+                # A waiting caller learns at once whether the robot is back.
                 await self._wanted.wait()
             self._wanted = anyio.Event()
             try:
@@ -256,14 +256,14 @@ Where CBOR is beyond the server's size limit it is dropped in silence, while JSO
 
 @dataclass(slots=True, eq=False)
 class RosbridgeTopicRequest(TopicRequest):
-    """How a topic was asked for."""
+    """The request for a topic."""
 
     operation_id: str = ""
     channel: Channel | None = None
 
     @property
     def encoding(self) -> Encoding:
-        """How the server is to write the messages."""
+        """The encoding in which the server shall send messages."""
         if not self.is_bulky:
             return Encoding.JSON
         return ENCODINGS[min(self.n_renewals, len(ENCODINGS) - 1)]

@@ -1,4 +1,4 @@
-"""The client of one robot: what it subscribes to, publishes, calls and pursues."""
+"""The client of one robot: its subscriptions, publications, calls and goals."""
 
 import logging
 from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
@@ -34,19 +34,20 @@ from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 logger = logging.getLogger(__name__)
 
 NODE = "rosbridge_websocket"
-"""What rosbridge's node is called, whatever its namespace."""
+"""The name of rosbridge's node, without its namespace."""
 ROSAPI = "/rosapi/"
 UNKNOWN = "does not exist"
-"""In rosbridge's words; such a call has reached nobody, so it may be made again."""
+"""In rosbridge's words; such a call has not reached the service, so it may be repeated."""
 LOOK_AGAIN_S = 0.1
 
 
 class RosbridgeClient(Rosapi):
-    """One robot over two sockets: topics and goals on one, calls and what is urgent on the other.
+    """One robot over two sockets: topics and goals on one, calls and urgent messages on the other.
 
-    Some versions of rosbridge handle what comes over one socket one after another, so that a stop
+    Some versions of rosbridge handle the operations of one socket one after another, so that a stop
     sent behind a goal would act when the goal has ended. Hence a goal takes the socket that carries
-    none, and what is urgent takes the other; a goal that replaces another frees that one's socket.
+    no goal, and urgent messages take the other; a goal that replaces another frees that one's
+    socket.
     """
 
     def __init__(self, address: RobotAddress, *, patience: Patience = USUAL_PATIENCE) -> None:
@@ -72,7 +73,7 @@ class RosbridgeClient(Rosapi):
 
     @property
     def n_connections(self) -> int:
-        """How often the socket that carries topics and goals has been connected."""
+        """How often the socket that carries topics and goals was connected."""
         return self._control.n_connections
 
     @property
@@ -93,7 +94,7 @@ class RosbridgeClient(Rosapi):
 
     @property
     def own_ends(self) -> OwnEnds:
-        """What rosbridge's node does for us; it may do the like for its other clients."""
+        """The topics that rosbridge's node handles for us, and perhaps for other clients."""
         return OwnEnds(node=NODE, publishes=self.announcements.told, hears=frozenset(self.requests))
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
@@ -117,7 +118,7 @@ class RosbridgeClient(Rosapi):
         await self._urgent.start(tasks)
 
     async def aclose(self) -> None:
-        """Close both sockets, once what was published last has had time to arrive."""
+        """Close both sockets, once the last publications have had time to arrive."""
         # rosbridge forgets a message when the socket that brought it closes at once.
         await anyio.sleep_until(self._published_s + self.patience.linger_s)
         async with anyio.create_task_group() as tasks:
@@ -159,10 +160,9 @@ class RosbridgeClient(Rosapi):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return what a service answers. The wait ends, the connection stays.
+        """Return what a service answers. A timeout leaves the connection open.
 
-        rosbridge and rosapi are two nodes: what one of them knows the other may find a moment
-        later.
+        rosbridge and rosapi are two nodes: one may discover a moment later what the other knows.
         """
         left_s = self.patience.answer_s if timeout_s is None else timeout_s
         until_s = anyio.current_time() + left_s
@@ -200,7 +200,7 @@ class RosbridgeClient(Rosapi):
         return values if isinstance(values, dict) else {}
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""
+        """Send a goal to an action of ROS 2 and return the goal, updated as its state changes."""
         goal = ActionGoal(goal_id=new_id(), action=action)
         text = write_operation(
             "send_action_goal",
@@ -313,7 +313,7 @@ class RosbridgeClient(Rosapi):
                 self.n_frames_refused += 1
 
     def _lose_goals(self, channel: Channel) -> None:
-        # rosbridge itself may have gone, and with it what it knew of goals that were given up.
+        # rosbridge itself may have restarted, and forgotten the goals that were given up.
         is_alone = channel.was_replaced
         lost = [
             goal
@@ -357,11 +357,11 @@ async def open_rosbridge_robot(
 ) -> AsyncGenerator[RosRobot]:
     """Offer the robot behind a rosbridge server while the context lasts.
 
-    Leaving the context does not stop the robot: call `stop` before, where that is wanted.
+    Leaving the context does not stop the robot: call `stop` before if wanted.
 
     Raises:
         LinkError: The robot cannot be reached, or does not say what it offers.
-        ConfigError: The address is none.
+        ConfigError: The address is invalid.
     """
     address = RobotAddress(url=url) if isinstance(url, str) else url
     async with open_client(address, patience=patience) as client:

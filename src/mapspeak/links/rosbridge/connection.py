@@ -1,4 +1,4 @@
-"""One live socket with all that hangs on it: what is to be sent, and who waits for an answer."""
+"""One live socket: its queue of messages to send, and the calls that wait for an answer."""
 
 import logging
 from collections.abc import Awaitable, Callable
@@ -136,7 +136,7 @@ class SocketConnection:
                 self._answer(event)
             elif event is not None:
                 self._tell(event)
-            # Whoever waited for this message sees it before the next one comes.
+            # A waiting caller sees this message before the next one comes.
             await anyio.lowlevel.checkpoint()
 
     async def _understand(self, received: Received) -> Event | None:

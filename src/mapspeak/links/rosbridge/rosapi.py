@@ -1,4 +1,4 @@
-"""What a robot is made of, as its rosapi tells; what its types look like, where it cannot say."""
+"""The graph of a robot from its rosapi, and definitions of types that rosapi cannot describe."""
 
 import json
 from collections.abc import Awaitable, Callable, Mapping
@@ -24,7 +24,7 @@ Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
 
 
 class DefinitionKeeper:
-    """Definitions of one robot. What it has said is kept; only what is unknown is asked for again.
+    """Definitions of one robot. Its answers are kept; only unknown types are asked for again.
 
     On ROS 2 some of rosapi's services that describe types end or hang it: these are never called
     there, so that services and actions are described by what we know ourselves.
@@ -41,7 +41,8 @@ class DefinitionKeeper:
         bare, kinds = bare_type(type_name), _kinds_of(type_name)
         if not self._known:
             self._known = known_definitions(dialect, distro=distro)
-        # What the robot did not say when it was asked, and we know ourselves, is not asked again.
+        # A type that the robot did not describe, and that we know ourselves, is not asked for
+        # again.
         is_answered = bare in self._not_told and find_parts(self._known, bare, kinds)
         if not find_parts(self._told, bare, kinds) and not is_answered:
             await self._ask_graph()
@@ -56,7 +57,7 @@ class DefinitionKeeper:
         try:
             answer = await self._call("/rosapi/topics_and_raw_types", {})
         except LinkError:
-            return  # An early rosapi has no such service; what we know ourselves is left.
+            return  # An early rosapi has no such service; our own definitions remain.
         types, texts = answer.get("types"), answer.get("typedefs_full_text")
         if not isinstance(types, list) or not isinstance(texts, list):
             return
@@ -100,7 +101,7 @@ def _kinds_of(type_name: str) -> tuple[str, ...]:
 
 
 def _write_text(detail: Mapping[str, Any]) -> str:
-    """Return as a .msg text what rosapi says of one type in lists."""
+    """Return rosapi's lists about one type as a .msg text."""
     names, types, lengths, constants, values = (
         value if isinstance(value := detail.get(key), list) else []
         for key in ("fieldnames", "fieldtypes", "fieldarraylen", "constnames", "constvalues")
@@ -178,7 +179,7 @@ class Rosapi(RosLink[RosbridgeTopicRequest]):
         return tuple(sorted(_texts(await self.call_service("/rosapi/nodes"), "nodes")))
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Return what a node publishes, subscribes to and serves."""
+        """Return the topics and services that a node publishes, subscribes to and serves."""
         answer = await self.call_service("/rosapi/node_details", {"node": node})
         return NodeLinks(
             publishes=tuple(sorted(_texts(answer, "publishing"))),

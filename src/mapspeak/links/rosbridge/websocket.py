@@ -21,7 +21,7 @@ from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
 
 READ_BYTES = 262_144
 FED_BYTES = 4_096
-"""What is understood in one go: 2,000 empty frames take some 20 ms."""
+"""Bytes parsed in one go: 2,000 empty frames take some 20 ms."""
 MAX_PARTS = 10_000
 """Frames of one message, beyond which the connection is given up."""
 MAX_SKIPPED_BYTES = 1_000_000_000
@@ -114,7 +114,7 @@ class WebSocket:
 
     @property
     def fault(self) -> str:
-        """What the other end did against the protocol; empty where it did nothing."""
+        """The other end's violation of the protocol; empty without one."""
         error = self._protocol.parser_exc
         return self._fault or ("" if error is None or isinstance(error, EOFError) else str(error))
 
@@ -143,7 +143,7 @@ class WebSocket:
         await self._flush()
 
     async def say_goodbye(self) -> None:
-        """Say that we will send nothing more; whoever receives learns when the other end agrees."""
+        """Announce the end of our messages; the receiver learns when the other end agrees."""
         if self._protocol.state is State.OPEN:
             self._protocol.send_close()
         await self._flush()
@@ -192,7 +192,7 @@ class WebSocket:
             self._arrived.append(Received(parts, self._is_text, self._n_bytes))
 
     async def _flush(self) -> None:
-        # Bytes leave in the order in which they were made, whoever made them.
+        # Bytes of all callers leave in the order in which they were made.
         async with self._sending:
             data = b"".join(self._protocol.data_to_send())
             if not data:
@@ -211,7 +211,7 @@ async def open_websocket(address: RobotAddress, *, timeout_s: float) -> WebSocke
     """Connect to a rosbridge server.
 
     Raises:
-        LinkError: Nobody is there, or somebody else.
+        LinkError: No server answers, or another kind of server.
         ConfigError: The CA file cannot be read.
     """
     context = address.build_ssl_context()
@@ -275,7 +275,7 @@ async def _shake_hands(address: RobotAddress, stream: ByteStream) -> WebSocket:
         raise _no_rosbridge(address, "hung up without a word") from error
     if protocol.handshake_exc is not None:
         raise _refusal(address, protocol.handshake_exc) from protocol.handshake_exc
-    # What came in the same packet as the answer is not lost.
+    # Bytes that came in the same packet as the answer are not lost.
     for event in protocol.events_received():
         if isinstance(event, Frame):
             web_socket._take(event)  # noqa: SLF001 - likewise

@@ -1,4 +1,4 @@
-"""What sending goals, following them and ending them means, whichever ROS it is."""
+"""Sending, following and ending goals, the same for both versions of ROS."""
 
 import logging
 import math
@@ -29,21 +29,21 @@ PAUSES_S = (0.1, 0.2, 0.4, 0.8, 1.6, *30 * (4.0,))
 """Between two attempts to cancel a goal that goes on though it was withdrawn."""
 N_KEPT = 50
 LONGEST_LOOK_S = 2.0
-"""Of robot time between two looks no more is silence: a clock that is set is none."""
+"""Most silence counted between two looks, in robot time: more means that the clock was set."""
 
 logger = logging.getLogger(__name__)
 
 
 class ActionClient(ABC):
-    """Sends goals to one action, and knows each of them until the action server has ended it.
+    """Sends goals to one action, and follows each until the action server has ended it.
 
-    A goal that we said to be over is *withdrawn*: one that was not taken in time, that was ended
+    A goal that we reported as over is *withdrawn*: one that was not taken in time, that was ended
     before it was taken, or whose server fell silent. Should the server take it, or still have it,
     it is cancelled again and again until the server has ended it, and `afterwards` tells so.
 
     Attributes:
-        ends_others: Ending means the goals of other clients too: they move the robot as ours do.
-        listeners: Called whenever anything was heard of any goal; they must not raise.
+        ends_others: Ending includes goals of other clients, which move the robot as ours do.
+        listeners: Called at every news of any goal; they must not raise.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ActionClient(ABC):
         self._now_s: Callable[[], float] = anyio.current_time
         self._looked_s = math.inf
 
-    # --- what is known
+    # --- known goals
 
     @property
     def is_busy(self) -> bool:
@@ -103,7 +103,7 @@ class ActionClient(ABC):
 
     @property
     def others(self) -> Mapping[str, ActionState]:
-        """How goals of other clients stand that are under way, as far as they can be told."""
+        """The states of other clients' goals under way, as far as these can be told apart."""
         ours = self.ours
         return {
             server_id: state
@@ -124,7 +124,7 @@ class ActionClient(ABC):
                 await self._list.wait_for_more_than(0, timeout_s=left_s)
 
     def look(self) -> None:
-        """Take in that time has passed: that nothing was heard for long says something too."""
+        """Take in that time has passed: a long silence may end a goal."""
         now_s = self._now_s()
         passed_s = min(max(now_s - self._looked_s, 0.0), LONGEST_LOOK_S)
         self._looked_s = now_s
@@ -140,7 +140,7 @@ class ActionClient(ABC):
         """Take for lost a goal whose feedback has come once and then stays away; in robot time."""
         self._feedback_within_s, self._now_s = within_s, now_s
 
-    # --- what is done
+    # --- commands
 
     def advertise(self, through: RosConnection) -> dict[str, str]:
         """Say that we will publish, where that is needed; return the types by topic."""
@@ -160,11 +160,11 @@ class ActionClient(ABC):
         Args:
             arguments: The goal's fields.
             through: The connection to send it over, and to cancel it; it may be guarded.
-            owner: The client with whom it ends; None where somebody else sees to that.
-            n_stops: Those that there had been when the goal was wanted; None for up to now.
+            owner: The client with whom it ends; None where the caller ends it.
+            n_stops: The number of stops when the goal was requested; None for the present one.
 
         Raises:
-            GoalError: There was a stop since the goal was wanted.
+            GoalError: There was a stop since the goal was requested.
             LinkError: It could not be sent.
         """
         started = self._connection.started
@@ -213,10 +213,10 @@ class ActionClient(ABC):
     async def end(self) -> bool:
         """End every goal of ours, and where they move the robot too, those of others.
 
-        Returns whether somebody was there to be told; False also where nothing was under way.
+        Returns whether a server was there to be told; False also if nothing was under way.
 
         Raises:
-            LinkError: Says what could not be ended.
+            LinkError: Names the goals that could not be ended.
         """
         self._connection.started.n_stops += 1
         taken = [goal for goal in self.open_goals if goal.state is not ActionState.SENT]
@@ -235,7 +235,7 @@ class ActionClient(ABC):
 
     @abstractmethod
     async def cancel_all(self, through: RosConnection | None = None) -> int:
-        """Cancel every goal of the action, whoever sent it; return how many there were.
+        """Cancel every goal of the action, of all clients; return how many there were.
 
         Raises:
             LinkError: The server refuses, or cannot be told.
@@ -244,7 +244,7 @@ class ActionClient(ABC):
     # --- inside: each ROS in its own way
 
     async def _is_served(self) -> bool:
-        """Return whether somebody has heard `cancel_all`; a service that cancels has answered."""
+        """Return whether a server has received `cancel_all`; a cancel service has answered."""
         return True
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""The client of an action: one for each connection and action, whoever uses it."""
+"""The client of an action: one for each connection and action, shared by all callers."""
 
 from mapspeak.ros.actions.client import ActionClient
 from mapspeak.ros.actions.ros1 import Ros1ActionClient
@@ -13,7 +13,7 @@ def open_action(
     """Return the client of an action."""
     known = connection.started.actions.get(action)
     if isinstance(known, ActionClient):
-        # A type that somebody got wrong must not stay for ever.
+        # A wrong type must not stay for ever.
         is_right = known.type_name == type_name or known.ends_others
         if is_right or known.is_busy:
             return known

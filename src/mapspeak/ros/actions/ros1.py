@@ -55,7 +55,7 @@ class Ros1ActionClient(ActionClient):
         return types
 
     async def cancel_all(self, through: RosConnection | None = None) -> int:
-        """Cancel every goal of the action, whoever sent it; return how many there were."""
+        """Cancel every goal of the action, of all clients; return how many there were."""
         self._publish_cancel("", through or self._connection)
         return sum(not state.is_final for state in self._statuses.values())
 
@@ -98,7 +98,7 @@ class Ros1ActionClient(ActionClient):
             )
 
     def _look_at(self, goal: ActionGoal) -> None:
-        """Take in that a server has fallen silent; what it lists it says five times a second."""
+        """Take in that a server has fallen silent; it sends its list five times a second."""
         if goal.listed_end_s is not None:
             self._end_by_list(goal, self._statuses.get(goal.id, ActionState.LOST), "")
         since_s = self._connection.connected_for_s
@@ -108,7 +108,7 @@ class Ros1ActionClient(ActionClient):
         if goal.state is not ActionState.SENT and silent_s > self._patience.return_s:
             self._withdraw(goal, ActionState.LOST, SILENT.format(silent_s))
 
-    # --- what the topics say
+    # --- messages of the topics
 
     def _take_list(self, message: Message) -> None:
         self._statuses = {}
@@ -170,7 +170,7 @@ class Ros1ActionClient(ActionClient):
 
 
 def _read_list(message: Message) -> Iterator[tuple[str, ActionState, str]]:
-    """Yield id, state and text of each goal of a list; leave out what is none."""
+    """Yield id, state and text of each goal of a list; leave out invalid entries."""
     entries = message.get("status_list")
     for entry in entries if isinstance(entries, list) else []:
         named = entry.get("goal_id") if isinstance(entry, Mapping) else None

@@ -30,23 +30,23 @@ UNSAID = "The action server ended the goal without saying how."
 SUSPECTED_S = (0.05, 0.05, 0.1, 0.1, 0.2, 0.5, 1.0, 1.0)
 """Between two attempts to find out whether a goal that has appeared is a withdrawn one."""
 UNNAMED_S = 0.3
-"""So long a goal that may be a withdrawn one may go on, where safety comes first."""
+"""How long a goal that may be a withdrawn one may go on, where safety comes first."""
 RECENT_S = 60.0
-"""So long after the end of a goal the list may name it for the first time."""
+"""How long after a goal's end the list may name it for the first time."""
 N_SEEN_KEPT = 1_000
 
 
 class Ros2ActionClient(ActionClient):
-    """Sends goals, and joins what is heard of them: from the connection, and from the list.
+    """Sends goals, and joins the news of them: from the connection, and from the list.
 
     In ROS 2 itself the server knows a goal by the id that we gave it. rosbridge gives it another,
     and does not tell which: there, the goal that newly appears in the list, and is not over, is
     ours. As long as it may be an older one of ours, which has ended without an id, no newer one
-    gets that id: how that stands, feedback and result tell. rosbridge is told again to cancel a
-    withdrawn goal by the id it has for it, which touches no other client's; a goal that goes on
-    nevertheless is left alone. Only where rosbridge may have forgotten the id, because the
-    connection was lost since, or where the robot was told to stop, no difference can be made for
-    certain, and safety comes first: the goal is cancelled, whoever sent it.
+    gets that id: feedback and result tell its state. rosbridge is told again to cancel a withdrawn
+    goal by the id it has for it, which touches no other client's; a goal that goes on nevertheless
+    is left alone. Only where rosbridge may have forgotten the id, because the connection was lost
+    since, or where the robot was told to stop, the goals cannot be told apart for certain, and
+    safety comes first: the goal is cancelled, whichever client sent it.
     """
 
     def __init__(self, connection: RosConnection, action: str, *, type_name: str) -> None:
@@ -61,13 +61,13 @@ class Ros2ActionClient(ActionClient):
 
     @property
     def others(self) -> Mapping[str, ActionState]:
-        """How goals of other clients stand; nothing while it is unknown which of them is ours."""
+        """The states of other clients' goals; empty while an unknown one of them is ours."""
         if self._suspected or any(goal.server_id is None for goal in self.open_goals):
             return {}
         return super().others
 
     async def cancel_all(self, through: RosConnection | None = None) -> int:
-        """Cancel every goal of the action, whoever sent it; return how many there were."""
+        """Cancel every goal of the action, of all clients; return how many there were."""
         connection = through or self._connection
         connection.clear_the_way()
         answer = await self._call_cancel(connection, {})
@@ -129,10 +129,10 @@ class Ros2ActionClient(ActionClient):
             hint="If the robot still moves, stop it by hand.",
         )
 
-    # --- what is heard
+    # --- news of goals
 
     def _hear(self, goal: ActionGoal) -> None:
-        """Take in what the connection tells of a goal."""
+        """Take in the connection's news of a goal."""
         goal.heard_s = anyio.current_time()
         self._consider(goal)
         self._tell()
@@ -140,7 +140,7 @@ class Ros2ActionClient(ActionClient):
     def _look_at(self, goal: ActionGoal) -> None:
         self._consider(goal)
         if goal.is_lost:
-            # What brought its feedback is gone; the list goes on.
+            # The connection that brought its feedback is gone; the list goes on.
             goal.silent_s = 0.0
         silent_s = anyio.current_time() - goal.heard_s
         is_sent = goal.state is ActionState.SENT
@@ -149,7 +149,7 @@ class Ros2ActionClient(ActionClient):
             self._connection.start_soon(partial(self._check_served, goal))
 
     async def _check_served(self, goal: ActionGoal) -> None:
-        """Withdraw a goal whose server is no more: over rosbridge nobody else would tell."""
+        """Withdraw a goal whose server is gone: rosbridge does not tell of that."""
         try:
             servers = await self._connection.fetch_publishers(f"{self.action}/_action/status")
         except LinkError:
@@ -199,7 +199,7 @@ class Ros2ActionClient(ActionClient):
             self._note_server_end(goal)
             return
         is_listed = status is not None and self._list.n_received > goal.n_lists_at_end
-        # That a lost goal was taken once is no sign of life.
+        # The earlier acceptance of a lost goal does not show that it is alive.
         is_taken = goal.is_accepted and goal.state is not ActionState.LOST
         if is_taken or is_listed or goal.feedback is not goal.taken_feedback:
             self._note_life(goal)
@@ -210,7 +210,7 @@ class Ros2ActionClient(ActionClient):
             said = end.values if isinstance(end.values, str) else ""
             goal.finish(ActionState.REJECTED, reason=said or "The action server refused it.")
             return
-        # Without a status of its own the result says nothing; the list of all goals may.
+        # A result without a status does not tell the end; the list of all goals may.
         state = STATES.get(end.status or 0) or self._statuses.get(goal.server_id or "")
         if state is None or not state.is_final:
             goal.finish(ActionState.LOST, reason=UNSAID, result=values)
@@ -298,7 +298,7 @@ class Ros2ActionClient(ActionClient):
                 return
 
     def _resolve(self, goal: ActionGoal, server_id: str) -> None:
-        """Give an id to a goal that is over; what it may have been is then known to be another."""
+        """Give an id to a goal that is over; other goals that might have had it are then free."""
         goal.server_id = server_id
         self._note_life(goal)
         if not self._suspects():
@@ -340,7 +340,7 @@ class Ros2ActionClient(ActionClient):
 
 
 def _read_statuses(message: Message) -> Iterator[tuple[str, ActionState]]:
-    """Yield id and state of each goal of a list; leave out what is none."""
+    """Yield id and state of each goal of a list; leave out invalid entries."""
     entries = message.get("status_list")
     for entry in entries if isinstance(entries, list) else []:
         try:

@@ -1,1 +1,1 @@
-"""What ROS types look like: definitions read, known ones, messages shown, checked and built."""
+"""ROS types: definitions read, known ones, messages shown, checked and built."""

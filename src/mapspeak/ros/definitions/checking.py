@@ -1,4 +1,4 @@
-"""A type in words, and messages about to be sent held against what their type says."""
+"""A type in words, and the check of outgoing messages against their type."""
 
 import base64
 import difflib
@@ -78,12 +78,12 @@ MOST_SHOWN = 40
 def check_message(book: TypeBook, type_name: str, message: object) -> dict[str, Any]:
     """Return a message as it may be sent: fields left out stay out, whole numbers become floats.
 
-    Every message goes through here before it is sent: no link looks at what it is given, but
-    rosbridge's, which sees to what JSON can hold. Lists of numbers may be numpy arrays; uint8[] may
-    be bytes or, as in JSON, base64.
+    Every message is checked here before it is sent: no link checks messages, except rosbridge's for
+    what JSON can hold. Lists of numbers may be numpy arrays; uint8[] may be bytes or, as in JSON,
+    base64.
 
     Raises:
-        LinkError: It does not fit; says the field's path and what its type wants.
+        LinkError: It does not fit; names the field's path and what its type wants.
     """
     return _check(book, type_name, message, path="")
 
@@ -127,7 +127,7 @@ def check_field(book: TypeBook, field: Field, value: object, *, path: str) -> An
 
 
 def _count(field: Field, value: object) -> int | None:
-    """Return how many values a list has; None for what is no list of that field."""
+    """Return how many values a list has; None for a value that is not a list for that field."""
     if isinstance(value, str):
         return _n_bytes(value) if field.type in BYTES else None
     if isinstance(value, bytes | bytearray | memoryview):
@@ -141,7 +141,7 @@ def _check_array(book: TypeBook, field: Field, values: NDArray[Any], *, path: st
     kinds = {"bool": "b"}.get(field.type, "iuf" if field.type in FLOATS else "iu")
     if values.size and (field.type not in NUMBERS or values.dtype.kind not in kinds):
         raise _misfit(path, f"a list of numbers ({field.shown_type})", f"{values.dtype}")
-    # Where one is no number, it is the least and the largest.
+    # A NaN or an infinity in the list is the least or the largest value.
     for extreme in (values.min(), values.max()) if values.size else ():
         _check_value(book, field, extreme, path=path)
     return values

@@ -18,7 +18,7 @@ KINDS = ("msg", "srv", "action")
 SERVICE_PARTS = ("Request", "Response")
 ACTION_PARTS = ("Goal", "Result", "Feedback")
 GENERATED = re.compile(r"_(Request|Response|Goal|Result|FeedbackMessage|Feedback)$")
-"""What ROS 2 makes of services and actions; no message of a person has an underscore."""
+"""Suffixes of types that ROS 2 derives; messages that people define have no underscore."""
 
 
 def split_definition(type_name: str, text: str) -> dict[str, str]:
@@ -52,12 +52,12 @@ def name_parts(type_name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def find_parts(
     texts: Container[str], type_name: str, kinds: Iterable[str] = KINDS
 ) -> tuple[str, ...]:
-    """Return the names under which a type is among some texts: its own, or those of its parts.
+    """Return the names of a type in some texts: its own, or those of its parts.
 
     Args:
         texts: By name as "package/Type", as `RosConnection.fetch_definitions` gives them.
         type_name: Of a message, a service or an action.
-        kinds: What it may be, the likeliest first.
+        kinds: The kinds it may be, the likeliest first.
     """
     service, action = name_parts(type_name)
     options = {"msg": (bare_type(type_name),), "srv": service, "action": action}
@@ -111,7 +111,7 @@ PARTS_OF_ACTION = {
 
 
 def action_parts(action_type: str) -> dict[str, str]:
-    """Return the texts of what ROS 2 makes of an action, by name."""
+    """Return the texts of the types that ROS 2 derives from an action, by name."""
     bare = bare_type(action_type)
     return {
         f"{bare}_{part}": text.replace("{action}", bare) for part, text in PARTS_OF_ACTION.items()
@@ -126,7 +126,7 @@ DEFAULTS = {
     "geometry_msgs/Quaternion": ("float64 w", "float64 w 1"),
     "sensor_msgs/NavSatStatus": ("int8 status\n", "int8 status -2\n"),
 }
-"""What rosbags leaves out of ROS 2's definitions."""
+"""The parts of ROS 2's definitions that rosbags leaves out."""
 
 
 def known_definitions(dialect: Dialect, *, distro: str = "") -> dict[str, str]:
@@ -178,7 +178,7 @@ def _entries(distro: str) -> Iterator[tuple[str, str]]:
 
 
 def _translate(name: str, text: str) -> str:
-    """Return what ROS 1 says instead of ROS 2: its own times, and another name in rosapi."""
+    """Return the ROS 1 form of a ROS 2 text: its own times, and another name in rosapi."""
     for ros2, ros1 in TIMES_OF_ROS1.items():
         text = text.replace(ros2, ros1)
     if name.startswith("rosapi/GetParam_"):

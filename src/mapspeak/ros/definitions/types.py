@@ -21,7 +21,7 @@ WHOLES = {
 """The kinds of whole numbers, each with the least and the largest."""
 TEXTS = ("string", "wstring")
 TIMES = {"time": "uint32 secs\nuint32 nsecs", "duration": "int32 secs\nint32 nsecs"}
-"""What ROS 1 has no message for, as the text that one would have."""
+"""Primitive types of ROS 1 that have no message, as the text that one would have."""
 PLAIN = frozenset((*FLOATS, *WHOLES, *TEXTS, *TIMES, "bool"))
 
 
@@ -31,10 +31,10 @@ class Field:
 
     Attributes:
         type: Of the value, or of one in a list; another message as "package/Type".
-        length: Of a list: 0 where it is not fixed; None where it is no list.
-        most: How long a list may be at most; None where that is not said.
-        most_letters: How long a text may be at most; None where that is not said.
-        default: What it holds unless said otherwise, as the definition says it.
+        length: Of a list: 0 where it is not fixed; None for a field that is not a list.
+        most: The largest length of a list; None without a bound.
+        most_letters: The largest length of a text; None without a bound.
+        default: Its default, as written in the definition.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageType:
-    """What messages of one type look like; the values of constants are left as text, by name."""
+    """The definition of a type of messages; the values of constants are left as text, by name."""
 
     name: str
     fields: tuple[Field, ...]
@@ -170,13 +170,13 @@ class TypeBook:
         return {each: self.texts[each] for each in dict.fromkeys((*listed, *within))}
 
     def missing(self, name: str) -> list[str]:
-        """Return the types within a known one that nobody has described."""
+        """Return the types within a known one that are not described."""
         types = [field.type for each in self.within(name) for field in self[each].fields]
         named = [kind for kind in dict.fromkeys(types) if "/" in kind]
         return [kind for kind in named if kind not in self.texts]
 
     def default(self, field: Field, depth: int = 0) -> Any:  # noqa: ANN401 - ROS JSON
-        """Return what a field holds unless said otherwise."""
+        """Return the default of a field."""
         if field.length is not None:
             one = Field(name=field.name, type=field.type)
             return [self.default(one, depth) for _ in range(field.length)]

@@ -1,4 +1,4 @@
-"""Types as rosbags describes them: what their hashes, and the code for their CDR, are made of."""
+"""Types as rosbags describes them: the source of their hashes and of the code for their CDR."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from mapspeak.ros.definitions.types import MOST_NESTED, Field, MessageType, Type
 from mapspeak.ros.messages.fields import bare_type
 
 NOTHING = Field(name="structure_needs_at_least_one_member", type="uint8")
-"""What ROS 2 puts in a message without fields."""
+"""The field that ROS 2 puts in a message without fields."""
 OF_ACTION = ("Goal", "Result", "Feedback", "FeedbackMessage")
 OF_SERVICE = ("Request", "Response")
 OF_ACTIONS_SERVICE = ("SendGoal", "GetResult")
@@ -26,7 +26,7 @@ def hash_type(book: TypeBook, name: str) -> str:
     """Return a type's hash, as nodes of ROS 2 tell it since Iron: "RIHS01_...".
 
     Raises:
-        LinkError: It or a type within is not known, holds itself, or holds what CDR cannot.
+        LinkError: It or a type within is unknown, contains itself, or cannot be encoded in CDR.
     """
     from rosbags.typesys.store import Typestore  # noqa: PLC0415 - takes 0.1 s
 

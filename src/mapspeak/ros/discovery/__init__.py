@@ -1,1 +1,1 @@
-"""What a robot offers, found by asking it, and overridden where a person knows better."""
+"""A robot's interfaces, found by asking it, and overridden where a person knows better."""

@@ -1,4 +1,4 @@
-"""What a person knows better than the search: robot.yaml, one line for each thing."""
+"""Overrides of the search by a person: robot.yaml, one line for each thing."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -38,7 +38,7 @@ class RosSettings(BaseModel):
 
     @property
     def variables(self) -> dict[str, str]:
-        """What is said here, as the variables that ROS reads."""
+        """These settings as the environment variables that ROS reads."""
         said = {
             "ROS_DOMAIN_ID": None if self.domain_id is None else str(self.domain_id),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery_range,

@@ -9,7 +9,7 @@ from enum import IntEnum, StrEnum
 from mapspeak.ros.messages.fields import Dialect
 
 USUAL_RADIUS_M = 0.2
-"""Where nobody says: between a TurtleBot 3 (0.11 m) and a delivery robot (0.35 m)."""
+"""Radius of an unknown robot: between a TurtleBot 3 (0.11 m) and a delivery robot (0.35 m)."""
 COMPRESSED_IMAGE = "sensor_msgs/CompressedImage"
 RAW_IMAGE = "sensor_msgs/Image"
 TWIST, TWIST_STAMPED = "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
@@ -19,7 +19,7 @@ POSE_WITH_COVARIANCE = "geometry_msgs/PoseWithCovarianceStamped"
 
 
 class PoseSource(StrEnum):
-    """Where the pose comes from, the best first."""
+    """The sources of the pose, the best first."""
 
     TF = "tf"
     POSE_TOPIC = "pose_topic"
@@ -28,7 +28,7 @@ class PoseSource(StrEnum):
 
 
 class NavigationKind(StrEnum):
-    """How goals are sent."""
+    """The ways to send goals."""
 
     NAV2 = "nav2"
     MOVE_BASE = "move_base"
@@ -38,10 +38,10 @@ class NavigationKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotProfile:
-    """What a robot offers; None where it does not.
+    """The interfaces of a robot; None where it has none.
 
     Attributes:
-        radius_source: Who said so: a parameter, or robot.yaml; empty where it is assumed.
+        radius_source: Its source: a parameter, or robot.yaml; empty where it is assumed.
         pose_topic: The topic, where it is not TF.
         pose_type: Its type, as "package/Type".
         tf_topics: /tf and /tf_static, or those of a namespace.
@@ -51,9 +51,9 @@ class RobotProfile:
         velocity_type: Twist or TwistStamped, as "package/Type".
         clock_topic: Where a simulation tells its time.
         namespace: Where the robot's topics are, such as /robot1; empty where they are in none.
-        other_namespaces: Of further robots, among which nobody has chosen.
-        dead_topics: Those of the above, and actions, that exist by name only: nobody publishes
-            them, or, of those that we would publish, nobody listens.
+        other_namespaces: Of further robots, where none was chosen.
+        dead_topics: Those of the above, and actions, that exist by name only: without a publisher
+            or, if we would publish them, without a subscriber.
     """
 
     name: str
@@ -91,7 +91,7 @@ def end_of_goals(kind: NavigationKind, name: str | None) -> str | None:
 
 
 class Worth(IntEnum):
-    """How good a part is that was found, the worst first."""
+    """How good a found part is, the worst first."""
 
     MISSING = 0
     NAMED = 1
@@ -100,7 +100,7 @@ class Worth(IntEnum):
 
 
 class RobotPart(StrEnum):
-    """What belongs together in a profile, by the key with which robot.yaml names it."""
+    """Fields of a profile that belong together, by their key in robot.yaml."""
 
     MAP = "map_topic"
     POSE = "pose_topic"
@@ -169,12 +169,12 @@ def find_missing(profile: RobotProfile) -> tuple[RobotPart, ...]:
 def improve(
     before: RobotProfile, now: RobotProfile, *, is_settled: bool, keeps_navigation: bool
 ) -> RobotProfile:
-    """Return the better of two looks, part by part: what was found is not lost by a later look.
+    """Return the better of two looks, part by part: a later look does not lose found parts.
 
     Args:
         before: As the robot is used.
         now: As it looks now.
-        is_settled: What is as good as before is used no more for another one.
+        is_settled: A part that is only as good as before does not replace the earlier one.
         keeps_navigation: A drive of ours runs over the navigation of before.
     """
     values: dict[str, object] = {}

@@ -1,6 +1,6 @@
-"""Which of the topics, actions and frames that are there a robot is used by.
+"""Choose the topics, actions and frames through which a robot is used.
 
-Of several topics of the right type the one that is meant is judged by its name.
+Among several topics of the right type, the name decides.
 """
 
 import re
@@ -39,7 +39,7 @@ Fields = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Nearness:
-    """Prefers topics of one robot among several, and those that somebody serves.
+    """Prefers topics of one robot among several, and those that are served.
 
     Attributes:
         namespace: Such as /robot1; empty for none.
@@ -61,13 +61,13 @@ class Nearness:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What a topic must be, and how it is usually called.
+    """The types that a topic may have, and its usual names.
 
     Attributes:
         types: As "package/Type"; an earlier one is preferred where names are equally good.
-        endings: How such topics' names end, as patterns, the usual one first.
+        endings: Patterns of the ends of such topics' names, the usual one first.
         never: Parts of names that mean something else.
-        takes_others: Takes a topic of the type, however it is called.
+        takes_others: Takes a topic of the type under any name.
     """
 
     types: tuple[str, ...]
@@ -136,7 +136,7 @@ def choose_profile(
     dead: frozenset[str] = frozenset(),
     services: frozenset[str] | None = None,
 ) -> RobotProfile:
-    """Return the best use of what there is; what a person said is taken as it stands.
+    """Return the best profile of the graph; overrides are taken as they stand.
 
     Topics known to exist by name only are `dead`; `services` are None where they are not known.
     """
@@ -175,7 +175,7 @@ def find_namespaces(graph: RosGraph, dead: frozenset[str]) -> tuple[str, ...]:
 def _choose_namespace(
     overrides: RobotOverrides, found: tuple[str, ...]
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the one that was said or of the only robot, and those among which nobody chose."""
+    """Return the given namespace or that of the only robot, and those left to choose from."""
     if overrides.namespace is not None:
         return f"/{overrides.namespace.strip('/')}", ()
     if len(found) == 1:
@@ -184,7 +184,7 @@ def _choose_namespace(
 
 
 def _find_dead_action(graph: RosGraph, navigation: Fields) -> frozenset[str]:
-    """Return an action that robot.yaml names and nobody serves."""
+    """Return an action that robot.yaml names and that has no server."""
     name = navigation["navigation_name"]
     is_action = navigation["navigation"] is NavigationKind.NAV2 and name is not None
     is_dead = is_action and graph.types and name not in graph.actions
@@ -196,7 +196,7 @@ class _Choice:
 
     Args:
         said: By robot.yaml.
-        near: Which of several robots is meant.
+        near: The robot to prefer among several.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Looking at what a robot is, again and again: its parts are found bit by bit."""
+"""Repeated looks at a robot: its parts are found bit by bit."""
 
 import json
 import math
@@ -66,7 +66,7 @@ COSTMAPS = {
         ("/local_costmap/local_costmap", ""),
     ),
 }
-"""Nodes, and what stands before the names of their parameters."""
+"""Nodes, and the prefixes of their parameters' names."""
 
 
 async def find_radius_m(
@@ -120,15 +120,15 @@ def _plausible(value: object) -> float | None:
 
 
 MOST_ROUNDS = 8
-"""Of asking who serves the best topics, and, where nobody does, choosing the next best."""
+"""Most rounds of checking that the best topics are served, and else choosing the next best."""
 RADIUS_S = 3.0
-"""For navigation to tell the radius, in wall time: one that hangs holds up nothing else."""
+"""Longest wait for navigation to tell the radius, in wall time: a hanging one must not block."""
 
 
 async def look_at_robot(
     connection: RosConnection, frames: frozenset[str], overrides: RobotOverrides
 ) -> tuple[RobotProfile, frozenset[str]]:
-    """Return what the robot offers now, or what robot.yaml says, and all names that it lists.
+    """Return the robot's present profile, with robot.yaml's overrides, and all names that it lists.
 
     Raises:
         LinkError: rosapi is missing, and robot.yaml does not say which ROS it is.
@@ -156,7 +156,7 @@ async def _choose_alive(
     frames: frozenset[str],
     services: frozenset[str] | None,
 ) -> RobotProfile:
-    """Return the best of what somebody serves, then of what is there by name."""
+    """Return the best of the served interfaces, then of those that exist by name."""
     liveness = Liveness(connection)
     trees = find_namespaces(graph, frozenset())
     for namespace in trees if len(trees) > 1 else ():
@@ -193,13 +193,13 @@ LONGEST_SETTLING_S = 20.0
 
 
 class RobotWatch:
-    """Looks at a robot until it is known whole, and then on for what is missing.
+    """Looks at a robot until all its parts are known, and later for the missing ones.
 
-    Nodes of ROS 2 are found one by one: some have been seen after 4.6 s, and Fast DDS repeats what
-    was lost on the way after 3 s.
+    Nodes of ROS 2 are found one by one: some were seen after 4.6 s, and Fast DDS repeats lost
+    messages after 3 s.
 
     Attributes:
-        on_change: Is called with the profile of before when a better one is found.
+        on_change: Called with the earlier profile when a better one is found.
         is_driving: Tells whether a drive of ours runs, so that the navigation must stay.
     """
 
@@ -223,14 +223,14 @@ class RobotWatch:
 
     @property
     def profile(self) -> RobotProfile:
-        """What was found so far."""
+        """The profile found so far."""
         if self._profile is None:
             raise LinkError("The robot has not been looked at yet.", hint="Try again in a moment.")
         return self._profile
 
     @property
     def missing(self) -> tuple[RobotPart, ...]:
-        """The parts of which better may be found; what robot.yaml says is good enough."""
+        """The parts of which better may be found; robot.yaml's are good enough."""
         return tuple(part for part in find_missing(self.profile) if not self._is_said(part))
 
     @property
@@ -256,7 +256,7 @@ class RobotWatch:
             try:
                 await self.look()
             except LinkError:
-                # Right after connecting, whoever would tell may not be found itself.
+                # Right after connecting, the node that would tell may not be found itself.
                 if anyio.current_time() - self._begun_s >= self._patience.settling_s:
                     raise
                 await anyio.sleep(PAUSE_S)
@@ -295,7 +295,7 @@ class RobotWatch:
         await self._wait_until(lambda: False)
 
     async def look(self) -> None:
-        """Take in what there is now: people start rosbridge first and SLAM later."""
+        """Take in the present graph: people start rosbridge first and SLAM later."""
         frames = self._frames.tree.frames
         now, names = await look_at_robot(self._connection, frames, self._overrides)
         if names != self._names or frames != self._frames_seen:

@@ -1,4 +1,4 @@
-"""What a frame and its fragments may hold: checked by counting, before anything is built."""
+"""Limits of a frame and its fragments: checked by counting, before anything is built."""
 
 import math
 from collections import OrderedDict
@@ -23,7 +23,7 @@ MAX_DEPTH = 64
 SMALL_BYTES = 16_384
 """A frame below this size cannot hold enough to be worth counting."""
 PART_BYTES = 1_000_000
-"""What is counted in one go: other threads may run between two parts."""
+"""Bytes counted in one go: other threads may run between two parts."""
 
 
 Raw = bytes | bytearray | memoryview
@@ -31,7 +31,7 @@ Raw = bytes | bytearray | memoryview
 
 
 class FrameFault(StrEnum):
-    """What is wrong with a frame."""
+    """The fault of a frame."""
 
     NO_JSON = "no_json"
     NO_CBOR = "no_cbor"

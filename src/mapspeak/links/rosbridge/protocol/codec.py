@@ -68,7 +68,7 @@ WORTH_CUTTING_BYTES = 16_384
 PART_BYTES = 100_000
 WHOLE_SIGNS = b"-0123456789, \t\r\n"
 SIGNS = WHOLE_SIGNS + b"+.eENaIinfty"
-"""Also of numbers as Python and JavaScript write them when they are none."""
+"""Also of NaN and infinity as Python and JavaScript write them."""
 
 Numbers = NDArray[np.number[Any]]
 
@@ -171,7 +171,7 @@ def _parse(text: bytes, dtype: type[np.int64 | np.float64]) -> Numbers | None:
         numbers: Numbers = np.fromstring(text, dtype=dtype, sep=",")
     except ValueError:
         return None
-    # What follows the last comma is what numpy does not insist on.
+    # numpy does not insist on a number after the last comma.
     return numbers if numbers.size == text.count(b",") + 1 else None
 
 
@@ -201,11 +201,11 @@ Nothing is read twice: a string is taken to its end or to that of the text, neve
 
 
 def decode_json(frame: Raw) -> Any:  # noqa: ANN401 - ROS JSON enters here
-    """Return what a JSON text says; long lists of numbers as read-only numpy arrays.
+    """Return the value of a JSON text; long lists of numbers as read-only numpy arrays.
 
     Raises:
-        FrameError: It is no JSON, not even as Python or JavaScript programs write it, or it holds
-            too much.
+        FrameError: It is not JSON, not even as Python or JavaScript programs write it, or holds too
+            much.
     """
     if len(frame) < WORTH_CUTTING_BYTES:
         return _parse_json(frame)
@@ -220,10 +220,10 @@ def decode_json(frame: Raw) -> Any:  # noqa: ANN401 - ROS JSON enters here
 
 
 def decode_cbor(frame: Raw) -> Any:  # noqa: ANN401 - ROS data enters here
-    """Return what a CBOR item says; typed arrays as read-only numpy arrays, uint8[] as bytes.
+    """Return the value of a CBOR item; typed arrays as read-only numpy arrays, uint8[] as bytes.
 
     Raises:
-        FrameError: It is no CBOR, or uses tags that no ROS message needs.
+        FrameError: It is not CBOR, or uses tags that no ROS message needs.
     """
     check_cbor(frame)
     try:

@@ -1,7 +1,6 @@
-"""What we ask of a rosbridge server, and what it tells, one value per kind.
+"""Operations for a rosbridge server, and its events, one value per kind.
 
-`Conversation` reads one connection as far as it has a memory: frames in, events out, never an
-exception.
+`Conversation` keeps the state of one connection: frames in, events out, never an exception.
 """
 
 import math
@@ -104,10 +103,10 @@ Event = Published | ServiceAnswered | GoalFedBack | GoalEnded | StatusNoted | Fr
 
 
 class Conversation:
-    """Understands what a rosbridge server sends over one connection.
+    """Parses the frames that a rosbridge server sends over one connection.
 
     Args:
-        max_bytes: The largest message that is taken, whole or in pieces.
+        max_bytes: The largest accepted message, whole or in fragments.
     """
 
     def __init__(self, *, max_bytes: int = MAX_FRAME_BYTES) -> None:
@@ -127,7 +126,7 @@ class Conversation:
         return len(frame) <= LIGHT_BYTES and not any(sign in frame for sign in SIGNS_OF_MORE)
 
     def receive(self, frame: Raw, *, is_text: bool) -> Event | None:
-        """Return what a frame says, JSON in UTF-8 or CBOR; None while the message is incomplete."""
+        """Return the event of a frame, JSON in UTF-8 or CBOR; None for a part of a message."""
         try:
             decode = decode_json if is_text else decode_cbor
             return self._understand(self._checked(frame, decode), is_whole=False)
@@ -163,7 +162,7 @@ def _published(operation: dict[str, Any]) -> Published:
 def _service_answered(operation: dict[str, Any]) -> ServiceAnswered:
     return ServiceAnswered(
         call_id=_text(operation, "id"),
-        # Old servers do not say; they answered only what succeeded.
+        # Old servers leave this out; they answered only successful calls.
         is_success=operation.get("result", True) is True,
         values=operation.get("values", {}),
     )
@@ -213,17 +212,17 @@ MAX_NESTING = 32
 
 
 class Encoding(StrEnum):
-    """How the server writes the messages of a topic."""
+    """The server's encoding of the messages of a topic."""
 
     JSON = "none"
     CBOR = "cbor"
 
 
 def write_operation(operation: str, **fields: Any) -> bytes:  # noqa: ANN401 - ROS JSON leaves here
-    """Return an operation as the server takes it; fields that are None are left away.
+    """Return an operation as the server takes it, without the fields that are None.
 
     Raises:
-        LinkError: A name or a type is none, or a number is not finite: a robot would act on it.
+        LinkError: A name or type is invalid, or a number is not finite: a robot would act on it.
     """
     said = {key: value for key, value in fields.items() if value is not None}
     for key in ("topic", "service", "action"):
