@@ -1,4 +1,4 @@
-"""What is where, in words: remembered places and the file that holds them."""
+"""Remembered places in words, and the file that holds them."""
 
 from mapspeak.memory.laserfan import LaserFan, LaserRing, build_ring
 from mapspeak.memory.merging import (

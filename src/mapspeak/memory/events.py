@@ -16,36 +16,33 @@ _WAYS = re.compile(
     r"^ *(?:please )?(?:avoid|keep|stay|slow|(?:do not|don't) (?:enter|use|cross|pass|block))\b",
     re.IGNORECASE | re.MULTILINE,
 )
-"""How people tell others of a way that is closed or slow: that is what an event is for."""
+"""Phrases about closed or slow ways: an event may say these."""
 _QUOTE_SIGN = re.compile(
     "[\"«»\u2039\u203a\u201a-\u201f]|(?<!\\w)['\u2018\u2019]|['\u2018\u2019](?!\\w)"
 )
 _NUMBER = r"-?\d+(?:\.\d+)?"
 _OWN_PLACE = re.compile(rf"(?:{_NUMBER} m around )?(?:[RCODFPT]\d+|{_NUMBER}, ?{_NUMBER})")
-"""A place by an id or in metres says nothing of its own."""
+"""A place given by an id or in metres needs no quotes."""
 
 
 def gives_orders(text: str) -> bool:
-    """Return True for words of an event that tell their reader what to do.
-
-    Quotes hide none of them.
-    """
-    # An order may stand within one pair of quotes, and it may go on behind them.
+    """Return True if the words of an event tell the reader what to do, even in quotes."""
+    # An order may be inside one pair of quotes, or continue behind them.
     return any(tells_what_to_do(_WAYS.sub("", _QUOTE_SIGN.sub(by, text))) for by in (" ", "\n"))
 
 
 def tell_place(place: str) -> str:
-    """Return where it is: an id or a point as it is, other words quoted."""
+    """Return the place: an id or a point unquoted, other words quoted."""
     if _OWN_PLACE.fullmatch(place):
         return place
     return "its place gives orders and is left out" if gives_orders(place) else quote(place)
 
 
 Outline = tuple[Point, ...]
-"""Corners in order; the last one is joined to the first."""
+"""Corners in order; the last is joined to the first."""
 
 ID_RULE = "at most 16 letters, digits, - and _"
-"""What an id of an event is made of: it is told without quotes."""
+"""Rule for event ids, which are shown without quotes."""
 ROBOT = "the robot"
 SHUT = "the robot could not get through"
 OPEN_AGAIN = f"{SHUT}, and came through later"
@@ -56,10 +53,10 @@ _PLACE_ID = re.compile(r"\b[RCOD]\d+\b")
 
 
 class Effect(StrEnum):
-    """What an event means for ways.
+    """Effect of an event on paths.
 
-    Closed: none leads through. Slow and avoid: ways around it are preferred where there are any,
-    for avoid also long ones. None: it is only a note.
+    Closed: no path leads through. Slow and avoid: paths around it are preferred, for avoid even
+    long ones. None: it is only a note.
     """
 
     CLOSED = "closed"
@@ -69,7 +66,7 @@ class Effect(StrEnum):
 
 
 class Every(StrEnum):
-    """How often an event comes again, at the hours and for as long as the first time."""
+    """Recurrence of an event, at the hours and for the duration of the first time."""
 
     ONCE = "once"
     DAY = "day"
@@ -79,18 +76,18 @@ class Every(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something that is so for a while.
+    """A temporary condition of a place.
 
     Attributes:
-        place: Where, in words or ids of the time of writing: "corridor C1".
-        outlines: Of the place at the time of writing, in the map frame; ids may change, and these
-            do not.
-        until: The first moment after; None where nobody knows. Of one that comes again, both are
-            of the first time.
+        place: In words or ids at the time of writing: "corridor C1".
+        outlines: Of the place at the time of writing, in the map frame; unlike ids, they never
+            change.
+        until: The first moment after the end; None if unknown. For a recurring event, both
+            times are those of the first occurrence.
         frame: The frame of the memory that its place is in; None for its own.
 
     Raises:
-        SemanticMapError: It has no words, an id that is none, no place where it needs one, or it
+        SemanticMapError: It has no words, an invalid id, no place though it needs one, or it
             ends before it begins.
     """
 
@@ -135,7 +132,7 @@ class Event:
         return self.until - self.begins <= timedelta(days=7 if self.every is Every.WEEK else 1)
 
     def find_time(self, now: datetime) -> tuple[datetime | None, datetime | None]:
-        """Return from when to when it lasts: now, else the next time."""
+        """Return its present occurrence, else the next one, as begin and end."""
         if self.every is Every.ONCE or self.begins is None or self.until is None:
             return self.begins, self.until
         length, zone = self.until - self.begins, self.begins.tzinfo
@@ -152,12 +149,12 @@ class Event:
             day += timedelta(days=1)
 
     def is_over(self, now: datetime) -> bool:
-        """Return True where it does not come any more."""
+        """Return True if it will not occur again."""
         return self.every is Every.ONCE and self.until is not None and self.until <= now
 
     @property
     def is_of_robot(self) -> bool:
-        """True for what the robot noted of its own drives: who takes its name says other words."""
+        """True for the robot's notes on its own drives; others under its name use other words."""
         is_in_its_words = self.text in (SHUT, OPEN_AGAIN) and self.effect is Effect.AVOID
         return self.source == ROBOT and is_in_its_words
 
@@ -176,7 +173,7 @@ class Event:
 
     @property
     def told_text(self) -> str:
-        """What is the matter as a reader is told: quoted, or left out where it gives orders."""
+        """The words for a reader: quoted, or left out if they give orders."""
         is_order = gives_orders(self.text)
         return "(its text gives orders and is left out)" if is_order else quote(self.text)
 
@@ -220,7 +217,7 @@ _NAMES_OF_ROBOT = (ROBOT, "robot")
 
 
 def is_name_of_robot(source: str) -> bool:
-    """Return True for the name under which the robot notes what it found, however it is written."""
+    """Return True for the name under which the robot makes notes, in any spelling."""
     return name_key(source) in _NAMES_OF_ROBOT
 
 
@@ -232,12 +229,12 @@ _EFFECTS = {
 
 
 def current_events(events: Iterable[Event], now: datetime) -> tuple[Event, ...]:
-    """Return those events that last at a moment, in the order of the file."""
+    """Return the events that are active at a moment, in the order of the file."""
     return tuple(event for event in events if event.is_current(now))
 
 
 def is_event_id(text: str) -> bool:
-    """Return True for what may be the id of an event: "E3", "wet-floor_2"."""
+    """Return True for a valid event id: "E3", "wet-floor_2"."""
     return _ID.fullmatch(text) is not None
 
 

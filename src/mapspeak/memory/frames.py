@@ -1,9 +1,8 @@
-"""Frames that records were made in, and how they lie to each other.
+"""Frames of records, and the transforms between them.
 
-A memory has a frame of its own, which has no id (None) and no entry: records belong to it unless
-they name another one. Every other frame is `{id, map, robot, walls, pose, in}`. Its pose is that of
-its origin in the frame `in`, the memory's own where it names none; without a pose nothing is known
-of how it lies.
+A memory's own frame has no id (None) and no entry: records belong to it unless they name another
+one. Every other frame is `{id, map, robot, walls, pose, in}`. Its pose is that of its origin in the
+frame `in`, by default the memory's own; without a pose its transform is unknown.
 """
 
 from collections.abc import Mapping
@@ -22,10 +21,10 @@ class MapFrame:
     """A frame beside the memory's own.
 
     Attributes:
-        map_id: The name of the map whose frame it is, where it has one.
-        robot: Which robot made the map.
-        walls: The name of the kept map that shows its walls; None where none was worth keeping.
-        pose: Of its origin in the frame `reference`; None while that is not known.
+        map_id: The name of its map, if it has one.
+        robot: The robot that made the map.
+        walls: The name of the kept map of its walls; None if no map was worth keeping.
+        pose: Of its origin in the frame `reference`; None while unknown.
     """
 
     id: str
@@ -37,7 +36,7 @@ class MapFrame:
 
     @property
     def observed_map(self) -> str:
-        """What observations call the map of this frame: "house#F2"."""
+        """Name of this frame's map in observations: "house#F2"."""
         return f"{self.map_id or ''}#{self.id}"
 
 
@@ -53,10 +52,9 @@ class Frames:
         return {frame.id: frame for frame in self.items}
 
     def find_root(self, frame_id: FrameId) -> tuple[FrameId, Pose]:
-        """Return the last frame that a frame is known to lie in, and its pose there.
+        """Return the root of a frame, and its pose there.
 
-        A frame that has no entry is a root of its own; frames that lie in each other have none
-        in common with others.
+        A frame without an entry is its own root; frames in a cycle share no root with others.
         """
         pose, seen = Pose(0.0, 0.0), {frame_id}
         while frame_id is not None:
@@ -79,7 +77,7 @@ class Frames:
         return Frames((*self.items, frame))
 
     def changed(self, frame_id: str, **entries: object) -> "Frames":
-        """Return them with one frame that says something else."""
+        """Return them with one frame changed."""
         return Frames(
             tuple(
                 replace(each, **entries) if each.id == frame_id else each  # type: ignore[arg-type]  # as replace takes them
@@ -88,12 +86,12 @@ class Frames:
         )
 
     def aligned(self, of: FrameId, into: FrameId, *, motion: Pose) -> "Frames":
-        """Return them with one relation more: of two frames that had none so far.
+        """Return them with a transform between two frames that had none so far.
 
         Args:
-            of: The one frame; all that lie in the same root follow it.
+            of: The moved frame; all frames with the same root follow it.
             into: The other frame.
-            motion: Moves poses of the one into the other.
+            motion: Moves poses of the former into the latter.
 
         Raises:
             SemanticMapError: The frame has no entry.
@@ -101,7 +99,7 @@ class Frames:
         (root, pose), (other_root, other_pose) = self.find_root(of), self.find_root(into)
         other_from_root = other_pose @ motion @ pose.inverse()
         if root is None:
-            # The memory's own frame lies in no other.
+            # The memory's own frame is always a root.
             root, other_root = other_root, root
             other_from_root = other_from_root.inverse()
         if root is None or root not in self.by_id:

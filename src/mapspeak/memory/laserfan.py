@@ -1,7 +1,7 @@
-"""What the robot's laser met from where a landmark was seen: all around, and as the file keeps it.
+"""Laser ranges at the pose that a landmark was seen from: all around, and as the file keeps them.
 
-A bearing read off a picture is good to ten degrees, so that the range along it says little. What is
-kept is therefore a fan of beams around it, from the same pose: where there is a surface now.
+A bearing read off a picture is good to ten degrees, so the range along it alone says little. The
+file therefore keeps a fan of beams around it, from the same pose.
 """
 
 import math
@@ -23,7 +23,7 @@ HALF_FAN_RAD = 7 * STEP_RAD
 """Two standard deviations of a direction that a person or a model reads off a picture, or 20
 degrees, in whole steps."""
 SAME_STAND_M = 0.1
-"""Who stands no farther from where the laser turned meets the same; a pose is no better known."""
+"""A scan is valid up to this distance from its pose; poses are not known better."""
 MOST_BEAMS = 360
 LEAST_TURN_RAD = math.radians(0.99)
 NEAREST_M, FARTHEST_M = 0.1, 1000.0
@@ -39,22 +39,21 @@ _EXAMPLE = "from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaserFan:
-    """What evenly spaced beams met, from the pose that a landmark was seen from.
+    """Ranges of evenly spaced beams from the pose that a landmark was seen from.
 
     Attributes:
         first_rad: The direction of the first beam from the heading of that pose, left positive.
         last_rad: The direction of the last one, more to the left.
-        ranges_m: By beam, from that pose; infinite where it met nothing, None where it is not
-            known what it met.
-        reach_m: How far a beam that met nothing would have met something; None where none did.
+        ranges_m: By beam, from that pose; infinite if it hit nothing, None if unknown.
+        reach_m: Range limit of the beams that hit nothing; None if all hit something.
 
     Raises:
-        SemanticMapError: It is not such a fan.
+        SemanticMapError: The values are no valid fan.
     """
 
     first_rad: float
     last_rad: float
-    # Directions alone tell nearly all fans apart, and places are looked up by all they say.
+    # Directions alone distinguish nearly all fans, and places are hashed by all their content.
     ranges_m: tuple[float | None, ...] = field(hash=False)
     reach_m: float | None = None
 
@@ -74,14 +73,14 @@ class LaserFan:
 
     @property
     def step_rad(self) -> float:
-        """From one beam to the next."""
+        """Angle from one beam to the next."""
         return (self.last_rad - self.first_rad) / (len(self.ranges_m) - 1)
 
     @property
     def text(self) -> str:
         """One line for people: directions in degrees, ranges in metres to the decimetre.
 
-        `-` is not known, and `>20` met nothing within 20 m.
+        `-` is unknown, and `>20` hit nothing within 20 m.
         """
         first, last = (math.degrees(each) for each in (self.first_rad, self.last_rad))
         if round(first, 2) == -180.0:
@@ -104,10 +103,10 @@ class LaserFan:
 
     @classmethod
     def read(cls, text: str) -> "LaserFan":
-        """Read what `text` gives.
+        """Parse the format of `text`.
 
         Raises:
-            SemanticMapError: It is none; says what is wrong.
+            SemanticMapError: The text is no fan; the message says why.
         """
         match = _TEXT.fullmatch(" ".join(text.split()))
         _require(match, "it", f"like '{_EXAMPLE}'")
@@ -138,12 +137,12 @@ class LaserFan:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LaserRing:
-    """What the laser met all around, one beam to every step; compared by identity.
+    """A full turn of the laser, one beam per step; compared by identity.
 
     Attributes:
-        ranges_m: From that pose, shape (120,), counter-clockwise from its heading; infinite where a
-            beam met nothing, NaN where it is not known.
-        reach_m: How far a beam that met nothing would have met something.
+        ranges_m: From that pose, shape (120,), counter-clockwise from its heading; infinite if a
+            beam hit nothing, NaN if unknown.
+        reach_m: Range limit of a beam that hit nothing.
     """
 
     pose: Pose
@@ -156,9 +155,9 @@ class LaserRing:
         object.__setattr__(self, "ranges_m", ranges_m)
 
     def find_fan(self, stood: Pose, bearing_rad: float) -> LaserFan | None:
-        """Return what was met around a bearing from the heading of where one stood, left positive.
+        """Return the ranges around a bearing from the heading of a pose, left positive.
 
-        None from elsewhere than where the laser turned, or where nothing is known.
+        None if the pose is not that of the scan, or nothing is known.
         """
         if self.pose.point.distance_to(stood.point) > SAME_STAND_M:
             return None
@@ -184,7 +183,7 @@ def build_ring(
     ranges_m: NDArray[np.float64],
     reach_m: float,
 ) -> LaserRing:
-    """Return a turn of the laser in even steps: of several beams to a step, the one nearest to it.
+    """Resample a turn of the laser to even steps: each step gets the beam nearest to it.
 
     Args:
         angles_rad: By beam, from the heading, left positive.

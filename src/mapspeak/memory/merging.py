@@ -1,9 +1,9 @@
-"""One place seen again: what is new joins what was remembered, thing by thing.
+"""Merge a new look at a place with what was remembered, thing by thing.
 
 A landmark that is not named this time is kept, with the pose and the time it was last seen from: an
 observer who reports the dock today has not said that the extinguisher beside it is gone. A look at
-a known thing from elsewhere is a further view of it, for two views tell where it is. The words for
-the place itself, its description and its layout, are said anew as a whole.
+a known thing from elsewhere is a further view of it, for two views tell where it is. The
+description and layout of the place itself are replaced as a whole.
 """
 
 import math
@@ -17,20 +17,20 @@ from mapspeak.memory.quoting import name_key
 from mapspeak.memory.waypoint import Confidence, Landmark, Waypoint
 
 SAME_BEARING_RAD = math.radians(30.0)
-"""Two looks at one thing, each 10 degrees off as a rule, differ by less 19 times in 20."""
+"""Two looks at one thing, each usually 10 degrees off, differ by less 19 times in 20."""
 SAME_RANGE_RATIO = 0.5
 """Ranges of one thing differ by less than this share of the longer one."""
 SAME_SPOT_M = 0.5
-"""From so near by a thing 3 m away has the same bearing to 10 degrees."""
+"""Moving by less changes the bearing of a thing 3 m away by under 10 degrees."""
 SAME_POSE_M = 0.05
-"""A pose so near by is the same one, estimated again."""
+"""A pose nearer than this is the same one, estimated again."""
 LEAST_HALF_VIEW_RAD = math.radians(20.0)
-"""Every usual camera shows so much to either side."""
+"""Every usual camera shows this much to either side."""
 CONE_MARGIN_RAD = math.radians(5.0)
 NEAR_M = 4.0
-"""From no farther, who looks at a thing would name it."""
+"""An observer looking at a thing from within this distance would name it."""
 MOST_VIEWS = 4
-"""A thing is not seen from more sides than a robot can come from; more tell hardly more."""
+"""Views kept per thing, about one per side a robot can come from; more add little."""
 
 _WEIGHT = {Confidence.CERTAIN: 2, Confidence.LIKELY: 1, None: 1, Confidence.UNSURE: 0}
 
@@ -39,7 +39,7 @@ Views = tuple[Landmark, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reunion:
-    """A thing that was remembered and is seen again.
+    """A remembered thing that is seen again.
 
     Attributes:
         before: As it was remembered, as seen from the new pose; the latest view, if of several.
@@ -53,11 +53,11 @@ class Reunion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Merge:
-    """A waypoint written again, and what became of each thing.
+    """A rewritten waypoint, and the outcome for each thing.
 
     Attributes:
-        kept: Things that were, and are not named this time: all views of each, the latest first.
-        gone: Things that were, and are said to be gone; the latest view of each.
+        kept: Remembered things not named this time: all views of each, the latest first.
+        gone: Remembered things reported gone; the latest view of each.
     """
 
     waypoint: Waypoint
@@ -68,7 +68,7 @@ class Merge:
 
 
 def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str] = ()) -> Merge:
-    """Return what is remembered of a place that is seen again.
+    """Merge a new look at a place with the remembered one.
 
     The same label near the same bearing is the same thing. Of its two looks from one spot the surer
     one counts, or the later of two equally sure ones; what that leaves open, the other fills in.
@@ -120,9 +120,9 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
 
 
 def group_views(waypoint: Waypoint) -> tuple[Views, ...]:
-    """Return the landmarks of a place by thing: views of one label from different spots are of one.
+    """Group the landmarks of a place by thing: views of a label from different spots share one.
 
-    Two of one label from one spot are two things, as are two that lie in different places.
+    Two of one label from one spot are two things, as are two in different positions.
     """
     return (
         *_group(waypoint, waypoint.safety_landmarks),
@@ -188,7 +188,7 @@ def _group(waypoint: Waypoint, landmarks: Iterable[Landmark]) -> tuple[Views, ..
 
 
 def find_cone(look: Waypoint) -> tuple[float, float] | None:
-    """Return from which to which bearing a look must have shown what was there; None for nowhere.
+    """Return the bearings between which a look must have shown everything; None for no such range.
 
     That is between the outermost things that it names, and in the middle of its picture.
     """
@@ -215,7 +215,7 @@ def _counted(views: Views, before: Waypoint, now: Waypoint) -> Views:
     """Return views of a thing that a look does not name: missed once more where it should."""
     told = (now.recorded_at, now.stamp_s)
     if now.recorded_at is not None and told == (before.recorded_at, before.stamp_s):
-        # A record that is joined again is the same look: it misses nothing twice.
+        # A record that is merged again is the same look and counts no second miss.
         return views
     latest, *others = views
     here = seen_from(latest, latest.pose or now.pose, now.pose)
@@ -286,7 +286,7 @@ def _pair(looks: Sequence[Landmark], things: Sequence[Views]) -> list[tuple[int,
 
 
 def _find_least_turn_rad(look: Landmark, views: Views) -> float | None:
-    """Return how far a look points past a thing; None where it is of another one.
+    """Return how far a look points past a thing; None if it shows another thing.
 
     Views from the spot of the look decide, where there are any: those from elsewhere say less.
     """
@@ -312,7 +312,7 @@ def _find_turn_rad(one: Landmark, view: Landmark) -> float | None:
 
 
 def _united(look: Landmark, views: Views) -> Views:
-    """Return a thing's views with a look of now, which comes first."""
+    """Return a thing's views with the present look first."""
     if _is_measured(look):
         joining = [v for v in views if _apart_m(look, v) <= SAME_SPOT_M or not _is_measured(v)]
     else:

@@ -1,4 +1,4 @@
-"""The pictures that were taken lately: where from, and which way each column of them looks."""
+"""Recent pictures: their poses, and the direction of each of their columns."""
 
 import hashlib
 import math
@@ -12,17 +12,17 @@ from mapspeak.memory.laserfan import LaserRing
 from mapspeak.spatial.viewing import HALF_VIEW_RAD, CameraView
 
 MOST_PICTURES = 500
-"""How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
+"""Number of pictures that can be referred to; older ones are forgotten here, kept or not."""
 BESIDE_RAD = math.radians(10.0)
-"""The middle of a thing that the edge cuts lies beside the picture, and is read off roughly."""
+"""Margin for things cut by the edge: their middle is beside the picture, and estimated."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureReading:
-    """How far the robot's own sensors measured something in a picture to be.
+    """A distance that the robot's sensors measured to something in a picture.
 
     Attributes:
-        bearing_rad: From the heading the picture was taken along, left positive.
+        bearing_rad: From the heading of the picture, left positive.
     """
 
     label: str
@@ -33,13 +33,13 @@ class PictureReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TakenPicture:
-    """What is known of a picture besides what it shows.
+    """Metadata of a picture.
 
     Attributes:
-        id: How a reader speaks of it: P12.
-        name: Its relative name, unlike that of any other picture of any run: P12-5d0c21f7.jpg.
-        pose: Where the robot stood, in the map frame; the camera looks along its heading.
-        reported: Labels of all that the robot's detector reports in it; None where none read it.
+        id: Short id for readers: P12.
+        name: Relative file name, unique among all runs: P12-5d0c21f7.jpg.
+        pose: Of the robot in the map frame; the camera looks along its heading.
+        reported: Labels of everything the robot's detector reports in it; None without a detector.
     """
 
     pose: Pose
@@ -54,14 +54,14 @@ class TakenPicture:
     reported: tuple[str, ...] | None = None
 
     def shows(self, bearing_rad: float) -> bool:
-        """Return True for a direction from the heading in the picture, or just beside it."""
+        """Return True if a direction, from the heading, is in the picture or just beside it."""
         if self.horizontal_fov_rad is None:
             return True
         return abs(wrap_angle(bearing_rad)) <= self.horizontal_fov_rad / 2 + BESIDE_RAD
 
     @property
     def view(self) -> CameraView:
-        """Where it was taken, and how wide it is or probably is."""
+        """Its pose and its known or assumed field of view."""
         if self.horizontal_fov_rad is None:
             return CameraView(self.pose)
         return CameraView(self.pose, self.horizontal_fov_rad / 2)
@@ -76,7 +76,7 @@ class TakenPicture:
             column_px: From the left edge; the middle of the picture is half its width.
 
         Raises:
-            SemanticMapError: The picture has no such column, or nobody knows how wide it looks.
+            SemanticMapError: The picture has no such column, or its field of view is unknown.
         """
         if not 0 <= column_px <= self.width_px:
             raise SemanticMapError(
@@ -94,7 +94,7 @@ class TakenPicture:
 
 
 class PictureBook:
-    """Names the pictures of one run in their order."""
+    """Numbers the pictures of one run."""
 
     def __init__(self) -> None:
         self._taken: OrderedDict[str, TakenPicture] = OrderedDict()
@@ -108,12 +108,12 @@ class PictureBook:
 
     @property
     def taken(self) -> tuple[TakenPicture, ...]:
-        """All that can be spoken of, the oldest first."""
+        """All pictures that can be referred to, the oldest first."""
         return tuple(self._taken.values())
 
     @property
     def half_view_rad(self) -> float:
-        """Half the opening of the camera by its latest picture, or of a common one."""
+        """Half the field of view of the latest picture, or of a common camera."""
         return self._views[-1].half_view_rad if self._views else HALF_VIEW_RAD
 
     @property
@@ -122,7 +122,7 @@ class PictureBook:
         return tuple(self._views)
 
     def add(self, picture: TakenPicture, data: bytes, *, media_type: str) -> TakenPicture:
-        """Return a picture that was just taken with its id, and a name where no folder gave one."""
+        """Return a new picture with its id, and a name unless a folder named it."""
         self._n_taken += 1
         picture_id = f"P{self._n_taken}"
         ending = media_type.partition("/")[2].replace("jpeg", "jpg")
@@ -136,7 +136,7 @@ class PictureBook:
         return taken
 
     def forget(self) -> bool:
-        """Let nobody speak of earlier pictures any more; return whether there were any."""
+        """Forget all earlier pictures; return whether there were any."""
         had_any = bool(self._taken)
         self._taken.clear()
         self._views.clear()

@@ -1,14 +1,14 @@
-"""The paper's semantic filtering policy: what a memory of places leaves out, and how it is told.
+"""The paper's semantic filtering policy: what a memory of places leaves out, and its wording.
 
 The paper describes its policy without quoting it: what is kept is stable, recognisable and useful
-for navigation. `LEFT_OUT` is the one home of the sentences; the prompt shows them all before, and
-whoever breaks one reads it after. The word lists are English and general; a text in another
-language passes, which costs no more than a record too many.
+for navigation. `LEFT_OUT` is the one home of the sentences: the prompt shows them all, and a
+refusal repeats the one that was broken. The word lists are English and general; a text in another
+language passes, which costs at most a superfluous record.
 
 A label is judged by its head, the word that says what the thing is: "fuse box" and "letter box" are
 equipment and a "cardboard box" is not, a "personnel lift" is a lift, and a "person beside the lift"
-is a person. What is quoted, or follows "sign:", is read off the thing and not judged; yet what is
-addressed to a robot stands in quotes or not at all.
+is a person. Text in quotes or after "sign:" is read off the thing and not judged; text addressed to
+a robot must be in quotes.
 """
 
 import re
@@ -24,7 +24,7 @@ from ruamel.yaml import YAML
 
 
 class Concern(StrEnum):
-    """What the policy leaves out."""
+    """Kinds of content that the policy leaves out."""
 
     PEOPLE = "people"
     ANIMALS = "animals"
@@ -67,7 +67,7 @@ _SENTENCE_END = re.compile(r"[.!?]+(?=\s|$)|\n")
 
 @cache
 def _knowledge() -> Mapping[str, Any]:
-    """Read the list of words, once: nothing ever changes it."""
+    """Read the list of words once; it never changes."""
     text = resources.files(__package__).joinpath("data/words.yaml").read_text(encoding="utf-8")
     knowledge: Mapping[str, Any] = YAML(typ="safe", pure=True).load(text)
     return knowledge
@@ -82,7 +82,7 @@ def words_of(entry: str) -> frozenset[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Patterns:
-    """What texts are searched for: a carrier is a thing that words stand on."""
+    """Patterns to search texts for; a carrier is a thing that bears words."""
 
     told: re.Pattern[str]
     carrier: re.Pattern[str]
@@ -113,9 +113,9 @@ def _patterns() -> _Patterns:
 
 
 def find_concern(label: str) -> Concern | None:
-    """Return why a landmark of that label, or a feature in those words, stays out; None if not.
+    """Return why a landmark of that label, or a feature in those words, stays out; None if allowed.
 
-    A label is what somebody calls a thing, in a few words.
+    A label names a thing in a few words.
     """
     text = _plain(label)
     if _patterns().doubt.search(_own_words(text)):
@@ -147,7 +147,7 @@ def gives_orders(text: str) -> bool:
 
 
 def tells_what_to_do(text: str) -> bool:
-    """Return True for a text of one or more sentences of which one gives orders."""
+    """Return True if any sentence of a text gives orders."""
     unquoted = _QUOTED.sub(" ", text.translate(_STRAIGHT))
     return any(gives_orders(part) for part in _SENTENCE_END.split(unquoted))
 
@@ -159,7 +159,7 @@ def _plain(text: str) -> str:
 
 
 def _own_words(text: str) -> str:
-    """Return what the observer says, without what is read off the thing."""
+    """Return the observer's words without those read off the thing."""
     patterns = _patterns()
     return patterns.after_carrier.sub(r"\1", patterns.told.sub(" ", _QUOTED.sub(" ", text)))
 
@@ -180,7 +180,7 @@ def _head(words: Sequence[str]) -> Sequence[str]:
 
 
 def _ends_head(words: Sequence[str], index: int) -> bool:
-    """Return True where a new thing or a deed begins: at "waiting" in "man waiting"."""
+    """Return True if a new thing or an action begins: at "waiting" in "man waiting"."""
     word = words[index]
     if word in words_of("ends_of_heads"):
         return True

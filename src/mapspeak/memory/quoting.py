@@ -1,4 +1,4 @@
-"""Remembered text on clean lines, compared, and told between quotes that it cannot end."""
+"""Clean, compare and quote remembered text, so that it cannot break out of its quotes."""
 
 import re
 import unicodedata
@@ -21,12 +21,12 @@ def clean_text(text: str) -> str:
 
 
 def name_key(name: str) -> str:
-    """Return what the spellings of a place's name have in common: no case, no spaces."""
+    """Return the key that all spellings of a place's name share: no case, no spaces."""
     return clean_line(unicodedata.normalize("NFKC", name).casefold())
 
 
 LONGEST_NAME = 120
-"""What writes allow; a file that somebody else wrote may have any."""
+"""Limit for writes; files written by others may have longer names."""
 _AS_APOSTROPHE = dict.fromkeys(
     map(ord, '"\u201c\u201d\u201e\u201f\u2033\u2036\u301d\u301e\uff02'), "'"
 )
@@ -36,18 +36,18 @@ _ID = re.compile(r"[\w./-]{1,100}")
 def quote(text: str, *, most: int | None = None) -> str:
     """Return a text on one line between double quotes, with none inside.
 
-    What is told beside it would else be taken for ours: `"` and what looks like it become `'`, and
-    line breaks and control signs become spaces. A backslash at the end escapes nothing.
+    Otherwise text after a quote inside could pass for ours: `"` and look-alikes become `'`, line
+    breaks and control characters become spaces. A backslash at the end escapes nothing.
 
     Args:
-        most: At most so many of its first characters; None for all.
+        most: Number of first characters to keep; None for all.
     """
     line = clean_line(text).translate(_AS_APOSTROPHE)[:most]
     return f'"{line} "' if line.endswith("\\") else f'"{line}"'
 
 
 def quote_name(name: str) -> str:
-    """Return what a place or a thing is called, as a quote that is no longer than names are."""
+    """Return the name of a place or thing in quotes, cut to the length of names."""
     return quote(name, most=LONGEST_NAME)
 
 

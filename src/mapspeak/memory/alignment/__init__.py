@@ -1,1 +1,1 @@
-"""Which map remembered places belong to: told from its walls, and moved when the map moves."""
+"""Find by walls which map remembered places belong to; move them when the map moves."""

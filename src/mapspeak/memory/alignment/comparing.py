@@ -1,4 +1,4 @@
-"""How two maps go together: one building or two, in one frame or two."""
+"""Compare two maps: one building or two, in one frame or two."""
 
 import math
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from mapspeak.spatial import OccupancyGrid
 
 NO_MOTION = Pose(0.0, 0.0, 0.0)
 STILL_M, STILL_RAD = 0.1, math.radians(1.0)
-"""A smaller motion is how maps differ from run to run, and no reason to touch records."""
+"""Maps differ by smaller motions from run to run; records stay as they are."""
 LEAST_STILL_M, LEAST_STILL_AGREEMENT = 8.0, 0.85
-"""So much is enough where maps agree as they lie: no place had to be looked for."""
+"""Thresholds for maps that agree unmoved; lower, as no placing was searched for."""
 PERHAPS_AGREEMENT = 0.75
-"""Maps that agree less, wherever they are laid, show different places."""
+"""Maps whose best agreement is lower show different places."""
 
 
 class MapRelation(StrEnum):
-    """How the map of the records and the robot's present map go together."""
+    """Relation between the map of the records and the robot's present map."""
 
     SAME = "same"
     MOVED = "moved"
@@ -35,12 +35,12 @@ class MapRelation(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapComparison:
-    """What a comparison of two maps gives.
+    """Result of comparing two maps.
 
     Attributes:
-        as_it_lies: How well they agree when nothing is moved.
-        fit: The best place for the old map, where one had to be looked for.
-        shortest_m: The walls of the map that shows less of them.
+        as_it_lies: Agreement without moving either map.
+        fit: The best placing of the old map, if one was searched for.
+        shortest_m: Wall length of the map that shows less wall.
     """
 
     relation: MapRelation

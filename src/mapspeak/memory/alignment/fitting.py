@@ -1,4 +1,4 @@
-"""The rigid motion that lays an old map on a new one: guessed by the walls, then refined."""
+"""Fit an old map onto a new one by a rigid motion: guess it from the walls, then refine it."""
 
 import math
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ from mapspeak.spatial.grid import FloatArray
 Raster = NDArray[np.float32]
 
 N_BINS = 360
-"""Of directions modulo pi: half a degree each."""
+"""Bins for directions modulo pi, half a degree each."""
 BLUR_BINS = 2.0
 N_TURNS = 6
 """Turns to be tried, each in both senses; a building of right angles has two."""
 APART_RAD = np.radians(4.0)
 LEAST_TURN_RATIO = 0.5
-"""A turn by which directions agree so much less than by the best one is not tried."""
+"""Skip turns that rise above the floor by less than this share of the best turn's rise."""
 N_SHIFTS = 4
 """Shifts to be tried for each turn."""
 APART_M = 1.0
@@ -32,7 +32,7 @@ LARGEST_RASTER = 1024
 """Cells along the side of the raster for shifts; a larger building gets larger cells."""
 NEAR_CELLS = 1.25
 CONFLICT = 0.5
-"""What a wall in clear floor counts against a wall on a wall."""
+"""Penalty for a wall in clear floor, relative to the credit for a wall on a wall."""
 
 
 def guess_transforms(old: MapSurfaces, new: MapSurfaces) -> Iterator[Pose]:
@@ -99,7 +99,7 @@ class _Field:
     def find_shifts(self, turn_rad: float) -> Iterator[Pose]:
         turn = Pose(0.0, 0.0, turn_rad)
         turned_centre = placed(self._old_centre[None], turn)[0]
-        # Laid about the raster's corner, so that a shift is where the centre comes to lie.
+        # Relative to the raster's corner, so that the shift is the new position of the centre.
         walls = self._drawn(placed(self._old_walls, turn) - turned_centre)
         floor = self._drawn(placed(self._old_floor, turn) - turned_centre)
         spectrum = np.conj(np.fft.rfft2(walls)) * self._fits
@@ -210,14 +210,14 @@ LEAST_SHARED_M = 25.0
 SURE_AGREEMENT, SURE_OVERLAP = 0.9, 0.5
 
 RIVAL_EVIDENCE = 0.8
-"""Another place for which so much of the evidence speaks could be meant as well."""
+"""A second placing with at least this share of the best evidence makes the fit ambiguous."""
 RIVAL_AGREEMENT, RIVAL_AGREEING_EVIDENCE = 0.05, 0.4
 """Likewise one that agrees as well as the best within the first, with less in common."""
 SAME_M, SAME_RAD = 0.5, math.radians(5.0)
 
 
 class Certainty(StrEnum):
-    """How sure it is that a map was laid in the right place."""
+    """Certainty that a map was placed correctly."""
 
     SURE = "sure"
     LIKELY = "likely"
@@ -227,10 +227,10 @@ class Certainty(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapFit:
-    """Where an old map lies on a new one.
+    """Placing of an old map on a new one.
 
     Attributes:
-        rival: How well they agree in the next best place; None where there is no other.
+        rival: Agreement at the second best placing; None without one.
         off_m: How far the middle of the old map's walls moves.
     """
 
@@ -242,12 +242,12 @@ class MapFit:
 
     @property
     def is_sure_enough(self) -> bool:
-        """True when poses may be moved by it."""
+        """True if poses may be moved by this fit."""
         return self.certainty in (Certainty.SURE, Certainty.LIKELY)
 
 
 def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
-    """Find where an old map lies on a new one; None where nothing can be laid on anything."""
+    """Find the placing of an old map on a new one; None if no placing is possible."""
     refined = (refine(old, new, guess) for guess in guess_transforms(old, new))
     judged = [(transform, judge(old, new, transform)) for transform in refined]
     if not judged:
@@ -256,7 +256,7 @@ def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
     best, quality = judged[0]
     middle = Point(*_middle(old.points).tolist())
     others = [each for transform, each in judged[1:] if not _is_same_place(transform, best, middle)]
-    # What competes most with the best place.
+    # The strongest rival of the best placing.
     rival = max(others, key=lambda each: (_is_rival(each, quality), each.evidence_m), default=None)
     return MapFit(
         new_from_old=best,

@@ -1,7 +1,7 @@
-"""A memory as it is on the robot's map: every pose in its frame, and what cannot be placed apart.
+"""A memory in the frame of the robot's map, with records that cannot be placed kept apart.
 
-This is the one place where records of other maps are held back: what is not aligned with the
-robot's map is no waypoint, no event and no thing to whoever reads here.
+Only this module holds back records of other maps: readers get no waypoint, event or thing that is
+not aligned with the robot's map.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,15 +19,15 @@ from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 
 MOST_KEPT = 4
-"""So many moved records are kept for each that there is."""
+"""Cached moved records per remembered record."""
 
 
 class FramedMemory(MemoryStore):
-    """A memory store whose reader and writer are on the robot's map.
+    """A memory store that is read and written in the frame of the robot's map.
 
     Attributes:
-        store: Where the records are, each in its own frame.
-        keeper: Which frame the robot's map is in.
+        store: Holds the records, each in its own frame.
+        keeper: Knows the frame of the robot's map.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class FramedMemory(MemoryStore):
     def read(self) -> SemanticMap:
         """Return the remembered places in the frame of the robot's map; others are elsewhere.
 
-        Before there is a map, all are given as they are: they lead nowhere without one.
+        Before there is a map, all places are returned unmoved: no drive can use them yet.
         """
         memory, here = (
             self.store.read(),
@@ -70,14 +70,14 @@ class FramedMemory(MemoryStore):
             placed = self._place(waypoint, memory.frames)
             (elsewhere if placed is None else here).append(placed or waypoint)
         if len(self._moved) > MOST_KEPT * max(len(memory.waypoints), 1):
-            self._moved.clear()  # Most are of records that read otherwise by now.
+            self._moved.clear()  # Most cached entries are of records that have changed since.
         return replace(memory, waypoints=tuple(here), elsewhere=tuple(elsewhere))
 
     def read_events(self) -> tuple[Event, ...]:
         """Return the events in the frame of the robot's map, and no others.
 
-        What people wrote down without metres, in a file that is of no known map, counts
-        everywhere: a closed way that is kept open is worse than an open one that is closed.
+        Events that people wrote without metres, in a file of no known map, apply everywhere:
+        driving a closed way is worse than avoiding an open one.
         """
         events = self.store.read_events()
         if not self.keeper.has_met:
@@ -97,7 +97,7 @@ class FramedMemory(MemoryStore):
         return event if is_of_no_map and not has_metres else None
 
     def name_map(self) -> str | None:
-        """Return what the map of the robot is called in observations; begin a frame where needed.
+        """Return the name of the robot's map in observations; begin a frame if needed.
 
         Raises:
             SemanticMapError: A new frame cannot be written.
@@ -122,7 +122,7 @@ class FramedMemory(MemoryStore):
         return tuple(placings)
 
     def read_entry(self, key: str) -> str | None:
-        """As of the store."""
+        """See `MemoryStore`."""
         return self.store.read_entry(key)
 
     def write(self, waypoint: Waypoint) -> WriteReceipt:
@@ -155,7 +155,7 @@ class FramedMemory(MemoryStore):
         return replace(waypoint, frame=self.keeper.place())
 
     def _place(self, waypoint: Waypoint, frames: Frames) -> Waypoint | None:
-        """Return a waypoint in the frame of the robot's map; None where that is not known."""
+        """Return a waypoint in the frame of the robot's map; None if its alignment is unknown."""
         here = self.keeper.frame
         if not self.keeper.is_placed:
             return None
@@ -174,7 +174,7 @@ class FramedMemory(MemoryStore):
         frames = self.store.read().frames
         waypoint = self._place(receipt.waypoint, frames)
         before = receipt.previous and self._place(receipt.previous, frames)
-        # The room that it was seen from just now is one of the robot's map.
+        # The room of a present sighting is a room of the robot's map.
         room_id = receipt.waypoint.room_id
         assert waypoint is not None  # noqa: S101 - it was just written in this frame or one aligned
         return replace(

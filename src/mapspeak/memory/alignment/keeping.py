@@ -1,4 +1,4 @@
-"""Which of a memory's frames the robot's map is in: told by the walls kept for each of them."""
+"""Recognise by kept walls which of a memory's frames the robot's map is in."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
@@ -23,22 +23,22 @@ from mapspeak.memory.waypoint import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 
 KEY = "snapshot"
-"""What the memory calls the kept map of its own frame."""
+"""Key of the kept map of the memory's own frame."""
 GROWN_RATIO = 0.1
-"""A map that shows so much more floor than the kept one is kept in its place."""
+"""A map with this share of floor more than the kept one replaces it."""
 SHRUNK_RATIO = 0.5
-"""A map with so little of the floor of the one before it was begun anew."""
+"""A map with less than this share of its predecessor's floor was begun anew."""
 LEAST_TELLING_M = 2.0
-"""Fewer walls say nothing of whether a map is the one before, grown on."""
+"""Shorter walls cannot show whether a map continues the previous one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealignReceipt:
-    """What became of records whose map may have moved.
+    """Result of aligning records whose map may have moved.
 
     Attributes:
-        motion: From the old frame to the robot's; None where nothing was aligned.
-        n_waypoints: How many are of a known frame now, and were not before.
+        motion: From the old frame to the robot's; None if nothing was aligned.
+        n_waypoints: Waypoints whose frame became known.
     """
 
     comparison: MapComparison
@@ -49,17 +49,16 @@ class RealignReceipt:
 
 
 class FrameKeeper:
-    """Says which frame the robot's map is in, keeps its walls, and aligns it with others.
+    """Identify the frame of the robot's map, keep its walls, and align it with other frames.
 
     Args:
-        name_robot: Names the robot whose maps they are; asked when a frame begins.
-        lock: Held by whoever asks or changes something; may be held twice by one thread. None
-            where only one thread does.
+        name_robot: Returns the name of the mapping robot; called when a frame begins.
+        lock: Reentrant; held during every read and change. None for use by one thread only.
 
     Attributes:
-        frame: The frame of the robot's map, where `is_placed`.
-        is_placed: False while no map was met, or it is not known which frame it is in.
-        n_maps: How often the robot's map was begun anew.
+        frame: The frame of the robot's map if `is_placed`.
+        is_placed: False before the first map, or while its frame is unknown.
+        n_maps: Number of times the robot's map was begun anew.
     """
 
     def __init__(
@@ -87,7 +86,7 @@ class FrameKeeper:
         return self._grid is not None
 
     def meet(self, grid: OccupancyGrid) -> None:
-        """Find out which frame the robot's map is in; it stays there while the map grows.
+        """Find the frame of the robot's map; it keeps that frame while it grows.
 
         Raises:
             SemanticMapError: The memory or a kept map cannot be read.
@@ -101,15 +100,15 @@ class FrameKeeper:
                 self._place(self._store.read())
 
     def has_walls(self, frame_id: FrameId) -> bool:
-        """Return True where something tells a frame from others."""
+        """Return True if something distinguishes a frame from others."""
         name = self._walls_of(frame_id)
         return name is not None and self._load(name) is not None
 
     def place(self) -> FrameId:
         """Return the frame of the robot's map, for a write; begin a new one where none is known.
 
-        The walls of the map are kept where none are or it has grown; of a map with hardly a wall
-        they are not: they would tell nothing.
+        The walls of the map are kept if there are none yet or the map has grown. A map with
+        hardly a wall is not kept, since it identifies nothing.
 
         Raises:
             SemanticMapError: A new frame cannot be written.
@@ -133,7 +132,7 @@ class FrameKeeper:
             return self.frame
 
     def _keep(self, grid: OccupancyGrid) -> bool:
-        """Keep the walls where none are or they have grown; False where another was quicker."""
+        """Keep the walls if none are kept or they have grown; False if another robot was first."""
         name = self._walls_of(self.frame)
         kept = None if name is None else self._load(name)
         if kept is None:
@@ -147,7 +146,7 @@ class FrameKeeper:
         """Compare the robot's map with the first one whose records cannot be used on it.
 
         Returns:
-            None where there is none.
+            None if there is no such map.
 
         Raises:
             SemanticMapError: A kept map is damaged, or none could be kept with the last write.
@@ -162,7 +161,7 @@ class FrameKeeper:
             return next((self._compare(name, kept, grid) for _, name, kept in strange), None)
 
     def realign(self) -> RealignReceipt:
-        """Align the frames of the memory with the robot's map where it is sure how.
+        """Align the frames of the memory with the robot's map where the fit is sure.
 
         Each frame gets one transform; no record changes.
 
@@ -184,7 +183,7 @@ class FrameKeeper:
     # --- where the robot's map is ------------------------------------------------------------
 
     def _place(self, memory: SemanticMap) -> None:
-        """Find the frame whose kept walls lie as the robot's map shows them."""
+        """Find the frame whose kept walls match the robot's map unmoved."""
         grid = self._grid
         for frame_id, name, kept in self._find_kept(memory):
             if grid is None:
@@ -279,7 +278,7 @@ class FrameKeeper:
                 yield frame_id, name, kept
 
     def _find_kept(self, memory: SemanticMap) -> Iterator[tuple[FrameId, str, OccupancyGrid]]:
-        """Return the frames of which walls are kept, the memory's own first."""
+        """Return the frames with kept walls, the memory's own first."""
         named = ((frame.id, frame.walls) for frame in memory.frames.items)
         for frame_id, name in ((None, self._walls_of(None)), *named):
             kept = None if name is None else self._load(name)
@@ -295,7 +294,7 @@ class FrameKeeper:
         return None if frame is None else frame.walls
 
     def _keep_walls(self, grid: OccupancyGrid, name: str | None) -> bool:
-        """Keep walls for the first time; False where another was quicker."""
+        """Keep walls for the first time; False if another robot was first."""
         kept_as = name or self._store.walls.free_name()
         if not self._store.walls.keep(grid, kept_as, is_first=True):
             return False
@@ -331,7 +330,7 @@ class FrameKeeper:
 
 
 def _goes_on(before: OccupancyGrid, grid: OccupancyGrid) -> bool:
-    """Return True where a map is the one before it, perhaps grown: its frame is the same."""
+    """Return True if a map continues the previous one, so that the frame is the same."""
     if grid is before:
         return True
     if _floor_m2(grid) < SHRUNK_RATIO * _floor_m2(before):
@@ -345,7 +344,7 @@ def _goes_on(before: OccupancyGrid, grid: OccupancyGrid) -> bool:
 
 
 def _is_nearly(before: OccupancyGrid, grid: OccupancyGrid, told: MapComparison) -> bool:
-    """Return True where looking for another place of a kept map again would find none."""
+    """Return True if another search for the placing of a kept map would find nothing."""
     if grid is before:
         return True
     if told.relation is MapRelation.SAME or before.origin != grid.origin:

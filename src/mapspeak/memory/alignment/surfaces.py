@@ -1,7 +1,7 @@
-"""What two maps of one building have in common: where walls face floor that somebody has seen.
+"""Wall surfaces that face seen floor: what two maps of one building have in common.
 
-Only surfaces count. How thick a wall is drawn, and whether what lies behind it is called occupied
-or unknown, differs from map to map.
+Only surfaces count. The thickness of a wall, and whether cells behind it are occupied or unknown,
+differ from map to map.
 """
 
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ Distances = NDArray[np.float32]
 FACING_M = 0.2
 """Some maps leave a seam of unknown cells between a wall and the floor before it."""
 SMOOTHING_M = 0.15
-"""Wall cells within about this distance of each other tell together where a wall runs."""
+"""Wall cells within about this distance together determine the direction of a wall."""
 CLEAR_M = 0.4
-"""Floor this far from any surface is no place for a wall, however roughly the maps agree."""
+"""Floor this far from any surface excludes walls, even between maps that agree roughly."""
 SEEN_M = 0.3
-"""So far behind a surface a map still knows what is there."""
+"""A map still counts as seen this far behind a surface."""
 _NEIGHBOURS = np.ones((3, 3), dtype=np.uint8)
 
 
@@ -73,7 +73,7 @@ class MapSurfaces:
 
     @cached_property
     def is_seen(self) -> Mask:
-        """True where the map can tell whether there is a surface."""
+        """True where the map shows whether there is a surface."""
         return np.asarray(self.grid.free | (self.distance_m <= SEEN_M), dtype=np.bool_)
 
     def distances_at(self, points: FloatArray) -> tuple[FloatArray, Mask]:
@@ -145,13 +145,13 @@ def placed(points: FloatArray, transform: Pose) -> FloatArray:
 
 
 TOLERANCE_M = 0.2
-"""Walls so near to each other are the same: SLAM bends, and door frames are drawn variously."""
+"""Walls this near to each other are the same: SLAM bends maps, and door frames vary."""
 MOST_POINTS = 8000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapAgreement:
-    """How well walls fit when one map is laid on another.
+    """Agreement of walls when one map is placed on another.
 
     Attributes:
         shared_m: Metres of surface, the mean of both maps, that lie where both have seen.
@@ -165,7 +165,7 @@ class MapAgreement:
 
     @property
     def evidence_m(self) -> float:
-        """Metres of surface that speak for this placing, less those that speak against it."""
+        """Metres of surface for this placing, minus those against it."""
         return self.shared_m * (2 * self.agreement_ratio - 1)
 
 

@@ -1,1 +1,1 @@
-"""Whether what is remembered can be true: findings that people can read, and what trust is left."""
+"""Consistency checks of remembered places: findings, and the trust that remains."""

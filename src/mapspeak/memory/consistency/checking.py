@@ -1,4 +1,4 @@
-"""All checks in order: whether records agree with the map, with their rooms and with each other."""
+"""Check records against the map, their rooms and each other."""
 
 import math
 from collections import Counter, defaultdict
@@ -26,7 +26,7 @@ FARTHEST_M = 1e6
 def check_pose(
     grid: OccupancyGrid, waypoint: Waypoint, distances: DistanceField | None, map_id: str | None
 ) -> Iterator[MemoryFinding]:
-    """Return what is odd about where a waypoint is."""
+    """Return findings about the position of a waypoint."""
     of, point = (waypoint.name,), waypoint.pose.point
     if waypoint.map_id is not None and map_id is not None and waypoint.map_id != map_id:
         ids = (waypoint.map_id, map_id)
@@ -55,7 +55,7 @@ N_SIGMAS = 2.0
 
 
 def check_rays(found: Things, waypoint: Waypoint) -> Iterator[MemoryFinding]:
-    """Return landmarks of a waypoint that lie behind a wall or where nobody has seen."""
+    """Return landmarks of a waypoint that lie behind a wall or in unseen space."""
     for stand in waypoint.standpoints:
         for landmark in stand.landmarks:
             kind_at = None if landmark.bearing_rad is None else _check(found, stand, landmark)
@@ -71,18 +71,18 @@ def check_rays(found: Things, waypoint: Waypoint) -> Iterator[MemoryFinding]:
 
 
 def _check(found: Things, stand: Waypoint, landmark: Landmark) -> tuple[FindingKind, float] | None:
-    """Return what is odd about a landmark's line of sight, and how far it is free; else None."""
+    """Return a finding about a landmark's line of sight and its free length; None if it is fine."""
     way = stand.pose.yaw_rad + (landmark.bearing_rad or 0.0)
     open_m = _open_m(found, stand, way)
     if open_m <= OWN_M:
-        return None  # It stands in an obstacle, which is another finding.
+        return None  # A waypoint in an obstacle is another finding.
     if _ends_in_unknown(found, stand, way, open_m):
         is_beyond = landmark.range_m is None or landmark.range_m > open_m
         return (FindingKind.THROUGH_UNKNOWN, open_m) if is_beyond else None
     if landmark.range_m is None:
         return None
     spread_m = NOISE.range_m + NOISE.range_ratio * landmark.range_m
-    # How far one sees at most within the noise of the direction.
+    # The farthest view within the noise of the direction.
     sigma_rad = NOISE.bearing_rad_of(landmark)
     turns = (-sigma_rad, 0.0, sigma_rad)
     widest_m = max(_open_m(found, stand, way + turn_rad) for turn_rad in turns)
@@ -130,7 +130,7 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
 
 
 def check_things(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
-    """Return things that some records speak against."""
+    """Return things that some records contradict."""
     placed = [thing for thing in found.things if thing.position is not None]
     at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
     yield from _two_labels(placed, at)
@@ -164,20 +164,20 @@ def _labels(waypoint: Waypoint) -> list[str]:
 
 
 BORDER_M = 1.0
-"""A border that is found anew moves no farther, and a pose is off by some of that."""
+"""A border found again moves by at most this; it covers pose errors too."""
 DOOR_M = 1.5
-"""What is wider is no door: the two regions may have been one."""
+"""Wider openings are not doors: the two regions may have been one."""
 LEAST_OF_MANY = 3
-"""From so many records on, most of which are off, it is the ids that are others."""
+"""If most of at least this many records are misfiled, the ids have changed instead."""
 
 
 def find_misfiled(
     rooms: RoomMap, waypoints: Iterable[Waypoint]
 ) -> dict[str, tuple[Region, Region]]:
-    """Return the records whose room is another one: the room that they name, and where they stand.
+    """Return for each misfiled record the room that it names and the room that it stands in.
 
     Args:
-        waypoints: All records, since together they tell whether ids have changed.
+        waypoints: All records, as only together they show whether ids have changed.
     """
     filed = [(each, *filing) for each in waypoints if (filing := _file(rooms, each)) is not None]
     off = [each for each in filed if each[1].id != each[2].id]
@@ -195,7 +195,7 @@ def find_misfiled(
 
 
 def _file(rooms: RoomMap, waypoint: Waypoint) -> tuple[Region, Region] | None:
-    """Return the room that a record names and the one that it stands in, where both are known."""
+    """Return the room that a record names and the room that it stands in; None if unknown."""
     told = rooms.find_region(waypoint.room_id) if waypoint.room_id else None
     point = waypoint.pose.point
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
@@ -204,7 +204,7 @@ def _file(rooms: RoomMap, waypoint: Waypoint) -> tuple[Region, Region] | None:
 
 
 def _find_moved(filed: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Return ids under which several records, and more than stand there, are in another room."""
+    """Return the ids that moved: several records, and more than stayed, are in one other room."""
     standing: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for told, here in filed:
         standing[told][here] += 1
@@ -223,7 +223,7 @@ def _distance_m(rooms: RoomMap, region: Region, point: Point) -> float:
 
 
 DOOR_MARGIN_M = 0.6
-"""A line of sight that is off by 10 degrees passes a door by so much at 3 m."""
+"""A line of sight with an error of 10 degrees misses a door by about this much at 3 m."""
 _STEP_M = 0.2
 
 
@@ -233,10 +233,10 @@ def check_rooms(
     waypoint: Waypoint,
     misfiled: Mapping[str, tuple[Region, Region]],
 ) -> Iterator[MemoryFinding]:
-    """Return what is odd about the room that a record names; one without a room has nothing.
+    """Return findings about the room that a record names; none for a record without a room.
 
     Args:
-        misfiled: Of every record that is, by its name, the room that it names and its own.
+        misfiled: By name of each misfiled record, the room that it names and its own.
     """
     if not waypoint.room_id:
         return
@@ -265,7 +265,7 @@ def check_rooms(
 def _regions_on(
     rooms: RoomMap, waypoint: Waypoint, thing: Thing, *, back_m: float
 ) -> tuple[Region, ...]:
-    """Return the rooms on the line from a place to a thing, up to so far before the thing."""
+    """Return the rooms on the line from a place to a thing, up to a distance before the thing."""
     assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
     start, end = waypoint.pose.point, thing.position
     far_m = start.distance_to(end)
@@ -310,10 +310,10 @@ def check_memory(
     distances: DistanceField | None = None,
     rooms: RoomMap | None = None,
 ) -> tuple[MemoryFinding, ...]:
-    """Return all that is odd about a memory, in the order of its places; the same every time.
+    """Return all findings about a memory, in the order of its places; deterministic.
 
     Args:
-        distances: From the robot, for whether it can get to a place; None leaves that out.
+        distances: From the robot, to check that places can be reached; None skips that check.
     """
     findings: list[MemoryFinding] = []
     misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}

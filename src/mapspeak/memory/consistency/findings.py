@@ -1,4 +1,4 @@
-"""What may be odd about a record. A finding lowers trust; it never takes anything away."""
+"""Findings about doubtful records. A finding lowers trust; it never removes anything."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from mapspeak.memory.things.thing import Thing, View
 
 
 class FindingKind(StrEnum):
-    """What is odd."""
+    """Kinds of findings."""
 
     OTHER_MAP = "other_map"
     OFF_MAP = "off_map"
@@ -39,29 +39,29 @@ WEIGHTS = {
     FindingKind.POINTS_PAST: 0.5,
     FindingKind.TWO_LABELS: 0.02,
 }
-"""What the odds of a thing are multiplied by. Nobody has to name all that is to be seen, so that
-"not seen" says little; two views of one place are no fault, so that a duplicate says nothing.
-Of two labels in one place that nobody names together, both are right one time in fifty; how much
-either loses depends on how well the other is seen."""
+"""Factors on the odds of a thing. Observers need not name all that they see, so "not seen" says
+little; two views of one place are not a fault, so a duplicate says nothing. Of two labels in one
+place that are never named together, both are right one time in fifty; the loss of either depends
+on how well the other is seen."""
 
 
 SEEN_ODDS = 20.0
-"""That a thing is where it was last seen, at the most, once a later look did not show it."""
+"""Highest odds that a thing is still where it was last seen, once a later look missed it."""
 MISSED_WEIGHT = 0.25
-"""What each such look multiplies the odds by: an eye misses about one thing in five."""
+"""Factor on the odds for each such look: observers miss about one thing in five."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MemoryFinding:
-    """Something odd about what is remembered.
+    """A doubt about something remembered.
 
     Attributes:
-        view: Of the one thing concerned, the view that points past it.
+        view: The view of the concerned thing that points past it.
         ids: Of the maps: the record's and the robot's. Of the rooms: the one that a record names
             or a thing lies in, and the one that it is seen from.
         radius_m: Of the robot that cannot get there.
-        told_m: How far away the landmark was told to be.
-        open_m: How far the line to the landmark leads over free floor.
+        told_m: The recorded distance of the landmark.
+        open_m: Length of the free part of the line to the landmark.
         n_since: How many looks later than the last one that saw the thing it stands for.
     """
 
@@ -80,14 +80,14 @@ class MemoryFinding:
 
     @property
     def weight(self) -> float:
-        """What the odds of a thing that it concerns are multiplied by, at the most."""
+        """The largest factor on the odds of a thing that it concerns."""
         return WEIGHTS[self.kind]
 
     def weight_for(self, thing: Thing) -> float:
-        """Return what the odds of one of the things that it concerns are multiplied by.
+        """Return the factor on the odds of one of the things that it concerns.
 
-        Two labels in one place hardly are both right, so that each is as much less likely as the
-        other is likely. Few views against many change little.
+        Two labels in one place are hardly both right, so each becomes less likely the likelier
+        the other is. Few views against many change little.
         """
         weight = self.weight
         if self.kind is not FindingKind.TWO_LABELS:
@@ -102,7 +102,7 @@ class MemoryFinding:
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """How far something may be trusted."""
+    """Degree of trust."""
 
     ratio: float
     findings: tuple[MemoryFinding, ...]

@@ -15,7 +15,7 @@ from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.grid import FloatArray
 
 LEAST_SHARE_IN_SIGHT = 0.5
-"""Who has so much of where a thing may be in plain sight would see it."""
+"""An observer with this share of a thing's possible positions in plain sight would see it."""
 
 
 def check_unseen(
@@ -47,7 +47,7 @@ def _find_last_seen(thing: Thing, by_name: Mapping[str, Waypoint]) -> datetime |
 def _missed(
     thing: Thing, last_seen: datetime | None, by_name: Mapping[str, Waypoint]
 ) -> Iterator[MemoryFinding]:
-    """Return the places that it was seen from once, and where later looks did not name it."""
+    """Return the places it was once seen from, whose later looks did not name it."""
     for view in thing.supporting:
         look = by_name.get(view.waypoint)
         if look is not None and view.landmark.n_missed and _is_later(look, last_seen):
@@ -73,7 +73,7 @@ def _not_seen(
     at: FloatArray,
     last_seen: Sequence[datetime | None],
 ) -> Iterator[MemoryFinding]:
-    """Return things in plain sight between what a waypoint names, which it does not name."""
+    """Return unnamed things in plain sight within the cone of what a waypoint names."""
     cone = find_cone(waypoint)
     if cone is None:
         return

@@ -1,5 +1,5 @@
-"""Episodes: every observation with its time, pose, picture and words, asked in many ways.
+"""Episodes: every observation with its time, pose, picture and words, queried in many ways.
 
-They lie beside the semantic map file, which stays the truth about places; episodes are the truth
-about what was observed, when and from where.
+They are stored beside the semantic map file. That file is authoritative for places; episodes are
+authoritative for what was observed, when and from where.
 """

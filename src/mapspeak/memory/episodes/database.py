@@ -19,10 +19,10 @@ from mapspeak.memory.store.durable import sync_folder
 SCHEMA_VERSION = 1
 
 _MOST_PAGES_IN_LOG = 4_000
-"""The log is folded into the file when it has so many pages of 4 kB, by the write that fills it.
+"""Pages of 4 kB in the write-ahead log at which the write that fills it makes a checkpoint.
 
-An observation changes about fifteen. At SQLite's own 1,000, one write in seventy has 1.5 MB to
-write instead of 0.13.
+An observation changes about fifteen. With SQLite's default of 1,000, one write in seventy takes
+1.5 MB instead of 0.13.
 """
 
 _SCHEMA = """
@@ -65,10 +65,10 @@ CREATE TABLE facts (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 
 
 class EpisodeDatabase:
-    """The file `episodes.sqlite`; all its faults are `SemanticMapError`s.
+    """The file `episodes.sqlite`; all its errors are `SemanticMapError`s.
 
     Args:
-        path: The file; it is made with its folder by the first write.
+        path: The file; the first write creates it and its folder.
     """
 
     def __init__(self, path: Path, *, lock_timeout_s: float) -> None:
@@ -77,7 +77,7 @@ class EpisodeDatabase:
         self._is_held_open = False
 
     def exists(self) -> bool:
-        """Return True when anything was ever written."""
+        """Return True if anything was ever written."""
         return self.path.exists()
 
     @contextlib.contextmanager
@@ -89,7 +89,7 @@ class EpisodeDatabase:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Return a connection that holds the writers' lock; done as a whole at the end, or not."""
+        """Return a connection with the writers' lock; it commits at the end, or rolls back."""
         with self._explained("write to"):
             self._make()
             with contextlib.closing(self._open()) as connection:
@@ -129,11 +129,11 @@ class EpisodeDatabase:
             )
 
     def _make(self) -> None:
-        """Make the file where there is none, and keep it open from then on."""
+        """Create the file if there is none, and keep it open."""
         if self._is_held_open:
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        # Made under another name: whoever reads finds all of it or nothing.
+        # Created under another name, so that readers find all of it or nothing.
         with FileLock(self.path.with_suffix(".lock"), timeout=self._lock_timeout_s):
             if not self.path.exists():
                 _make_empty(self.path.with_suffix(".new")).replace(self.path)

@@ -1,4 +1,4 @@
-"""One thing that was observed, and what can be asked of observations."""
+"""Observations, and queries for them."""
 
 import hashlib
 import math
@@ -17,7 +17,7 @@ _ID_BYTES = 6
 
 
 class ObservationKind(StrEnum):
-    """What an observation came from."""
+    """Origin of an observation."""
 
     PICTURE = "picture"
     RECORD = "record"
@@ -26,15 +26,13 @@ class ObservationKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """What was observed at one moment from one place.
+    """One observation: made at one moment from one place.
 
     Attributes:
-        recorded_at: When, by the calendar, with its time zone.
-        picture: Name of the picture in the memory's folder; None without one, or after it was
-            thinned.
-        room_id: The room or corridor it was observed from, by the id that it had then.
-        id: The same for the same content, so that writing twice is writing once; made from the
-            content unless given.
+        recorded_at: Calendar time with time zone.
+        picture: Name of the picture in the memory's folder; None without one or after thinning.
+        room_id: Id, at that time, of the room or corridor it was observed from.
+        id: Derived from the content unless given, so that a repeated write changes nothing.
     """
 
     recorded_at: datetime
@@ -58,7 +56,7 @@ class Observation:
 
     @property
     def searched_text(self) -> str:
-        """The words and the labels, as they are searched."""
+        """The words and labels that are searched."""
         return "\n".join(filter(None, (self.text, "; ".join(self.labels))))
 
     def _derived_id(self) -> str:
@@ -82,11 +80,11 @@ def microseconds_of(time: datetime) -> int:
 
 
 Rank = Callable[[str, Sequence[str]], Sequence[float]]
-"""Says of each text how well it fits a query: up to 1; 0 or less where it does not fit."""
+"""Returns for each text how well it fits a query: up to 1; 0 or less if it does not fit."""
 
 
 class EpisodeOrder(StrEnum):
-    """Which observations come first."""
+    """Order of observations."""
 
     NEWEST = "newest"
     OLDEST = "oldest"
@@ -96,7 +94,7 @@ class EpisodeOrder(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MapPlacing:
-    """How poses of a map are moved into the one that is asked about."""
+    """Transform from one map into the map of the query."""
 
     map_id: str | None
     motion: Pose
@@ -104,17 +102,17 @@ class MapPlacing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeQuery:
-    """Which observations are wanted: those that pass every filter that is given.
+    """A query for the observations that pass every given filter.
 
     Attributes:
         near: Near to a place in the map frame; or to where the first observation of another query
             was made, and then without the observations that the other query's words or label fit.
-        label: A thing seen, whatever its case.
-        placings: How maps lie to the one that is asked about; what is of no map among them is
-            nowhere near. None takes all poses as they are.
+        label: A thing seen; case does not matter.
+        placings: Transforms of maps into the map of the query; observations of other maps are
+            never near. None uses all poses unmoved.
         order: Which come first; None for the best where words are given, else the nearest where a
             place is given without a radius, else the newest.
-        as_of: Only the first so many that were ever written, so that pages do not shift.
+        as_of: Only this many of the first ever written, so that pages do not shift.
 
     Raises:
         SemanticMapError: A radius has no place or is not above 0, or an order has nothing to order
@@ -146,7 +144,7 @@ class EpisodeQuery:
 
     @property
     def effective_order(self) -> EpisodeOrder:
-        """The order that is asked for, or follows from what else is."""
+        """The order that was asked for, or the one that follows from the filters."""
         if self.order is not None:
             return self.order
         if self.words:
@@ -156,7 +154,7 @@ class EpisodeQuery:
 
 
 class EpisodeFilter(StrEnum):
-    """What an observation was found by; words are compared as they are, or by what they mean."""
+    """Reason for a hit; words are compared by spelling or by meaning."""
 
     WORDS = "words"
     MEANING = "meaning"
@@ -170,13 +168,13 @@ class EpisodeFilter(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeMatch:
-    """An observation that fits, and why.
+    """A matching observation, and why it matches.
 
     Attributes:
         fitting: Which of its words fit; those asked for, where meanings were compared.
-        label: The one asked for, as it stands there.
+        label: The requested label, as recorded.
         near_id: The observation that a nested query found there; None without one.
-        is_elsewhere: Its pose is on another map, and where that lies is not known.
+        is_elsewhere: Its pose is on another map whose placing is unknown.
     """
 
     observation: Observation
@@ -191,7 +189,7 @@ class EpisodeMatch:
 
 
 def placed(seen: Observation, placings: Iterable[MapPlacing] | None) -> EpisodeMatch:
-    """Return an observation with its pose on the map that is asked about, where that is known."""
+    """Return an observation with its pose on the map of the query, if its placing is known."""
     for placing in placings or ():
         if placing.map_id == seen.map_id:
             is_still = placing.motion == Pose(0.0, 0.0)
@@ -221,7 +219,7 @@ def _require(is_right: object, what: str, expected: str) -> None:
 
 
 def observation_of(waypoint: Waypoint) -> Observation | None:
-    """Return the writing of a record as an observation; None where its time is not known."""
+    """Return the writing of a record as an observation; None if its time is unknown."""
     if waypoint.recorded_at is None:
         return None
     said = (waypoint.name, waypoint.description, *waypoint.geometric_features)

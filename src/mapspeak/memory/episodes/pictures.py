@@ -32,13 +32,13 @@ def picture_name(content: bytes, taken_at: datetime) -> str:
 
 
 class PictureFolder:
-    """The files of the pictures; whoever changes them holds the writers' lock of the database."""
+    """The picture files; a change requires the writers' lock of the database."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def find(self, name: str | None) -> Path | None:
-        """Return the file of a picture; None where there is none, or it is none of this folder."""
+        """Return the file of a picture; None if it is missing or outside this folder."""
         if not name or Path(name).name != name:
             return None
         path = self.path / name
@@ -56,7 +56,7 @@ class PictureFolder:
         sync_folder(self.path)
 
     def remove_all_but(self, kept: Collection[str]) -> int:
-        """Remove the pictures of ours that nobody names, and return how many."""
+        """Remove our pictures that no record names, and return how many."""
         if not self.path.is_dir():
             return 0
         unknown = [
@@ -71,17 +71,17 @@ class PictureFolder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThinningRule:
-    """What is kept of the pictures: all new ones, then one per place and hour, then per day.
+    """Retention of pictures: all new ones, then one per place and hour, then per day.
 
     Observations themselves are never dropped, nor a picture that a record of the semantic map
     names. Hours and days are those of UTC, so that the answer is the same everywhere.
 
     Attributes:
-        all_for: As old as this, every picture is kept.
-        hourly_for: As old as this, one per place and hour is kept; older ones, per place and day.
+        all_for: Every picture is kept up to this age.
+        hourly_for: One per place and hour is kept up to this age; then one per place and day.
         place_m: Edge of the squares that count as one place, in metres.
         place_rad: Width of the directions that count as one, in radians.
-        limit_mb: How large all pictures may be; the oldest go first. Those that records name stay
+        limit_mb: Size limit of all pictures; the oldest go first. Those that records name stay
             even above it.
     """
 
@@ -128,7 +128,7 @@ def choose_dropped(
 
 
 def _group(picture: StoredPicture, now: datetime, rule: ThinningRule) -> object:
-    """Return what pictures have in common of which one is kept."""
+    """Return the key that pictures share of which one is kept."""
     age = now - picture.taken_at
     if age <= rule.all_for:
         return picture.name
@@ -140,7 +140,7 @@ def _group(picture: StoredPicture, now: datetime, rule: ThinningRule) -> object:
         picture.map_id,
         math.floor(pose.x / rule.place_m),
         math.floor(pose.y / rule.place_m),
-        # Half a width off, so that the directions of the axes lie in the middle of theirs.
+        # Shifted by half a width, so that the axes lie in the middle of their sectors.
         math.floor((pose.yaw_rad % math.tau) / rule.place_rad + 0.5)
         % max(round(math.tau / rule.place_rad), 1),
     )

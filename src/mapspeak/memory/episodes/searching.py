@@ -25,7 +25,7 @@ from mapspeak.memory.episodes.textindex import Scores, read_ids, score_words, sh
 from mapspeak.memory.quoting import name_key
 
 MOST_TEXTS = 2000
-"""How many different texts, the best ones, one query looks at."""
+"""Number of distinct texts, best first, that one query considers."""
 
 
 _PLAIN = "(SELECT *, 0 AS is_elsewhere, x AS here_x, y AS here_y FROM observations) AS o"
@@ -43,7 +43,7 @@ _ORDERS = {
 
 @dataclass(slots=True)
 class _Where:
-    """Conditions that all hold, with their values."""
+    """Conditions joined by AND, with their values."""
 
     conditions: list[str] = field(default_factory=lambda: ["1"])
     values: list[object] = field(default_factory=list)
@@ -58,10 +58,10 @@ class _Where:
 
 
 def _source(query: EpisodeQuery) -> str:
-    """Return the table to ask: poses moved into the map that is asked about.
+    """Return the table to query, with poses moved into the map of the query.
 
-    Where they are on no map that is known there, `here_x` and `here_y` are null, so that nothing
-    compares with them.
+    `here_x` and `here_y` are null for poses on maps of unknown placing, so that no comparison
+    matches them.
     """
     if query.placings is None:
         return _PLAIN
@@ -96,7 +96,7 @@ def _quoted(text: str | None) -> str:
 
 
 class EpisodeSearch:
-    """Questions to the database; texts that were read are kept, for they never change."""
+    """Queries to the database; texts are cached, as they never change."""
 
     def __init__(self) -> None:
         self._texts: tuple[str, ...] = ()
@@ -108,8 +108,8 @@ class EpisodeSearch:
         """Return one page of the observations that pass every filter.
 
         Args:
-            connection: Sees one state of the database.
-            rank: Who says how well texts fit; None compares words.
+            connection: Reads one state of the database.
+            rank: Scores how well texts fit; None compares words.
         """
         if query.as_of is None:
             newest = connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
@@ -124,7 +124,7 @@ class EpisodeSearch:
             if anchor.is_elsewhere:
                 query = replace(query, placings=None)
             if query.map_id is None and query.placings is None:
-                # The metres of other maps are others.
+                # Coordinates of other maps are not comparable.
                 where.add("o.map_id IS ?", anchor.observation.map_id)
             _leave_out(connection, where, near, anchor)
             near = anchor.observation.pose.point
@@ -145,7 +145,7 @@ class EpisodeSearch:
     def _score(
         self, connection: sqlite3.Connection, query: EpisodeQuery, where: _Where, rank: Rank | None
     ) -> dict[int, float]:
-        """Return the best texts of what passes the other filters: their ids with scores above 0."""
+        """Return the best texts that pass the other filters: ids with scores above 0."""
         words = query.words or ""
         is_filtered = len(where.conditions) > 2  # beside the state asked for
         passing = f"SELECT o.text_id FROM {_source(query)} WHERE {where.text}"  # noqa: S608 - our own conditions
@@ -173,7 +173,7 @@ def _leave_out(
     if nested.label is not None:
         where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
     if nested.words is not None:
-        # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
+        # By words, whatever the ranking: only the thing itself is left out, not similar ones.
         same = list(_best(score_words(connection, nested.words)))
         where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(same))
 
@@ -182,7 +182,7 @@ def _best(scores: Scores) -> dict[int, float]:
     """Return the highest scores above 0 by their place; of equal ones the later, newer text."""
     found = np.flatnonzero(scores > 0)
     if len(found) > MOST_TEXTS:
-        # What is not among them for sure need not be sorted.
+        # Skip sorting those that cannot be among the best.
         least = np.partition(scores[found], -MOST_TEXTS)[-MOST_TEXTS]
         found = found[scores[found] >= least]
     order = np.lexsort((-found, -scores[found]))[:MOST_TEXTS]

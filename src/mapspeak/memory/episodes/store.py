@@ -56,9 +56,9 @@ class EpisodeStore:
     """All observations of one memory, in `episodes.sqlite` and `pictures/`.
 
     Args:
-        folder: Where they are; it need not exist yet (see `memory_folder`).
-        named_pictures: Gives the names of pictures that records of the semantic map mention; they
-            are never dropped, and nothing is dropped while it raises.
+        folder: Holds them; it need not exist yet (see `memory_folder`).
+        named_pictures: Returns the pictures that records of the semantic map name; these are
+            never dropped, and nothing is dropped while it raises.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class EpisodeStore:
     # --- writing -----------------------------------------------------------------------------
 
     def write(self, observation: Observation, *, picture: bytes | None = None) -> Observation:
-        """Keep an observation, on the disk when it returns; one that is kept already stays one.
+        """Keep an observation, on the disk when this returns; a repeated one changes nothing.
 
         Args:
             picture: JPEG or PNG; kept under a name that the observation gets.
@@ -92,13 +92,13 @@ class EpisodeStore:
             observation = replace(observation, picture=name, id="")
         with self.database.writing() as connection:
             if picture is not None and observation.picture is not None:
-                # Under the lock: whoever thins takes a file without an observation for a leftover.
+                # Under the lock: thinning takes a file without an observation for a leftover.
                 self._pictures.put(observation.picture, picture)
             _insert(connection, observation, None if picture is None else len(picture))
             is_due = picture is not None and self._is_thinning_due(connection, observation)
         if is_due:
             with contextlib.suppress(SemanticMapError):
-                # The observation is kept; what could not be dropped now can be in an hour.
+                # The observation is kept; dropping pictures can wait for an hour.
                 self.thin(now=observation.recorded_at)
         return observation
 
@@ -110,10 +110,10 @@ class EpisodeStore:
     def take_over(
         self, other: "EpisodeStore", *, rename_map: Callable[[str | None], str | None]
     ) -> tuple[int, int]:
-        """Keep all of another store, or none; return how many observations and pictures are new.
+        """Keep all of another store, or nothing; return how many observations and pictures are new.
 
         Args:
-            rename_map: Tells what the map of an observation is called here.
+            rename_map: Returns the name here of an observation's map.
         """
         if not other.database.exists():
             return 0, 0
@@ -130,7 +130,7 @@ class EpisodeStore:
                 n_new += 1
                 if path is not None and content is not None:
                     self._pictures.put(path.name, content)
-                    # Looks that show the same share a file.
+                    # Identical pictures share a file.
                     names.add(path.name)
         return n_new, len(names)
 
@@ -168,7 +168,7 @@ class EpisodeStore:
     def thin(self, *, now: datetime) -> int:
         """Drop the pictures that the rule does not keep, and return how many files went.
 
-        Their observations stay. A crash in between leaves files that the next time removes.
+        Their observations stay. Files left by a crash in between are removed next time.
         """
         named = {Path(name).name for name in self._named_pictures()}
         with self.database.writing() as connection:
@@ -186,16 +186,16 @@ class EpisodeStore:
             return self._pictures.remove_all_but(named | {row[0] for row in kept})
 
     def _is_thinning_due(self, connection: sqlite3.Connection, latest: Observation) -> bool:
-        """Look once an hour, and when the pictures have outgrown their limit."""
+        """Return True once an hour, or if the pictures have outgrown their limit."""
         if _fact(connection, "thinned_hour") != _hour(latest.recorded_at):
             return True
         limit_bytes = self._rule.limit_mb * 1e6
-        # What records name may be above the limit for good.
+        # The pictures that records name may exceed the limit permanently.
         largest = max(limit_bytes, int(_fact(connection, "left_bytes")) + limit_bytes / 10)
         return _n_bytes(connection) > largest
 
     def _rule_when_full(self, stored: list[StoredPicture]) -> ThinningRule:
-        """Make room for some time when the limit is reached, so that not every write thins."""
+        """Thin to below the limit once it is reached, so that not every write thins."""
         n_bytes = sum({picture.name: picture.n_bytes for picture in stored}.values())
         if n_bytes <= self._rule.limit_mb * 1e6:
             return self._rule
@@ -277,10 +277,10 @@ def _hour(time: datetime) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BroughtOver:
-    """What came over.
+    """Numbers of copied records.
 
     Attributes:
-        n_observations: Each once, in however many memories it was.
+        n_observations: Each counted once, even if both memories had it.
     """
 
     n_observations: int = 0
@@ -290,12 +290,12 @@ class BroughtOver:
 def bring_over(
     first: Path, second: Path, *, to: Path, rename_map: Callable[[str | None], str | None]
 ) -> BroughtOver:
-    """Copy the observations of two semantic map files, with their pictures, for another one.
+    """Copy the observations of two semantic map files, with their pictures, to a third.
 
-    All of them or none; those of the memories stay as they are.
+    All are copied, or nothing; the sources do not change.
 
     Args:
-        rename_map: Tells what a map of the second's observations is called in the new one.
+        rename_map: Returns the new name of a map of the second file's observations.
 
     Raises:
         SemanticMapError: It has some, or they cannot be read or written.

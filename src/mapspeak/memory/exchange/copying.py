@@ -1,4 +1,4 @@
-"""A whole memory copied into an empty one, whatever keeps either."""
+"""Copy a whole memory into an empty one, between any kinds of stores."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Copied:
-    """What came along."""
+    """Numbers of copied records."""
 
     n_places: int
     n_events: int

@@ -57,7 +57,7 @@ class _Collection(BaseModel):
 
 
 def facts_of(waypoint: Waypoint) -> Facts:
-    """Return what is said of a waypoint besides x and y; what is not said is left out."""
+    """Return the known fields of a waypoint besides x and y."""
     said: Facts = dict(data_of(waypoint))
     pose = said.pop("pose")
     assert isinstance(pose, dict)  # noqa: S101 - a record has a pose
@@ -66,7 +66,7 @@ def facts_of(waypoint: Waypoint) -> Facts:
 
 
 def place_of(waypoint: Waypoint) -> Point:
-    """Return where a waypoint is, in the map frame, as files say it: to the millimetre."""
+    """Return the position of a waypoint in the map frame, rounded to millimetres as in files."""
     return Point(round(waypoint.pose.x, 3) + 0.0, round(waypoint.pose.y, 3) + 0.0)
 
 
@@ -91,7 +91,7 @@ def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
 
 
 def from_geojson(text: str) -> SemanticMap:
-    """Read the memory that `to_geojson` wrote; features of other kinds are left aside.
+    """Read the memory that `to_geojson` wrote; ignore features of other kinds.
 
     Raises:
         SemanticMapError: It is not GeoJSON, or no memory.
@@ -148,7 +148,7 @@ def _records(collection: _Collection) -> Iterator[tuple[Point, Facts]]:
 
 
 def _plain(key: str, value: object) -> object:
-    """Return numbers as numbers; the file's schema has them as the text that is to be written."""
+    """Return numbers as numbers; the file's schema holds them as text."""
     if isinstance(value, list):
         return [_plain("", item) for item in value]
     if isinstance(value, dict):

@@ -19,13 +19,13 @@ STILL = Pose(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mount:
-    """How a second memory's frames are called in the whole.
+    """Names of a second memory's frames in the united memory.
 
     Attributes:
-        frames: Of the whole.
-        ids: What each frame of the second memory is called, its own one as None.
-        walls: The maps to keep beside the whole, by their names.
-        finding: How the two memories' own frames lie, in words.
+        frames: Of the united memory.
+        ids: New id of each frame of the second memory; its own frame is None.
+        walls: The maps to keep beside the united memory, by name.
+        finding: Relation of the two memories' own frames, in words.
     """
 
     frames: Frames
@@ -34,7 +34,7 @@ class Mount:
     finding: str
 
     def rename_places(self, places: SemanticMap) -> SemanticMap:
-        """Return the second memory's places with their frames called as in the whole."""
+        """Return the second memory's places with their frames renamed."""
         waypoints = (
             replace(each, frame=self.ids.get(each.frame, each.frame), map_id=None)
             for each in places.waypoints
@@ -42,11 +42,11 @@ class Mount:
         return replace(places, waypoints=tuple(waypoints), map_id=None)
 
     def rename_event(self, event: Event) -> Event:
-        """Return an event of the second memory, without its id, with its frame called likewise."""
+        """Return an event of the second memory without its id and with its frame renamed."""
         return replace(event, id="", frame=self.ids.get(event.frame, event.frame))
 
     def rename_map(self, map_id: str | None, *, whole_map_id: str | None) -> str | None:
-        """Return what a map of the second memory's observations is called in the whole."""
+        """Return the new name of a map of the second memory's observations."""
         _, mark, of_frame = (map_id or "").rpartition("#")
         frame_id = self.ids.get(of_frame if mark and of_frame in self.ids else None)
         frame = None if frame_id is None else self.frames.by_id[frame_id]
@@ -56,9 +56,9 @@ class Mount:
 def mount(first: MemoryStore, second: MemoryStore) -> Mount:
     """Lay the frames of a second memory beside those of a first one.
 
-    The second memory's own frame becomes the first's where the walls of both lie alike or, without
-    walls, where both name the same map. Otherwise it stays a frame of its own, with its pose where
-    the walls tell it surely.
+    The second memory's own frame becomes the first's if the walls of both agree unmoved or, without
+    walls, if both name the same map. Otherwise it stays a separate frame, with a pose if the walls
+    determine it surely.
 
     Raises:
         SemanticMapError: A kept map is damaged.
@@ -121,7 +121,7 @@ def _with_walls(
 def _find_motion(
     kept: OccupancyGrid, others: Mapping[FrameId, OccupancyGrid]
 ) -> tuple[FrameId, Pose] | None:
-    """Return the frame on whose walls a kept map surely lies, and how; best without a motion."""
+    """Return the frame on whose walls a kept map surely fits, and the fit; prefer no motion."""
     compared = {frame_id: compare_maps(kept, other) for frame_id, other in others.items()}
     for frame_id, comparison in compared.items():
         if comparison.relation is MapRelation.SAME:

@@ -1,4 +1,4 @@
-"""Two memories of one map as one, and their files."""
+"""Unite two memories of one map, and their files."""
 
 import shutil
 from collections.abc import Collection, Iterable, Mapping
@@ -21,16 +21,16 @@ from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 SAME_PLACE_M = 1.0
-"""Poses under one name that lie further apart are two places."""
+"""Poses of one name farther apart are two places."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Union:
-    """Two memories as one.
+    """Two united memories.
 
     Attributes:
-        places: All of them: the first memory's in its order, then what only the second has.
-        findings: What became of each name that was in both and not the same.
+        places: The first memory's in their order, then those only in the second.
+        findings: Outcome for each name that differed between both.
     """
 
     places: SemanticMap
@@ -42,8 +42,8 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
     """Join two memories of one map.
 
     Places of one name that lie within a metre are joined: the newer says what both say, landmarks
-    and layout of both stay. Where it is not known which is newer they are joined only if that makes
-    no difference. Otherwise both stay, the second one with a number behind its name.
+    and layout of both stay. If it is unknown which is newer, they are joined only if that makes no
+    difference. Otherwise both stay, the second one with a number behind its name.
 
     Raises:
         SemanticMapError: They belong to different maps.
@@ -84,7 +84,7 @@ APART = "nobody knows how the one's map lies to the other's"
 
 
 def _in_frame_of(mine: Waypoint, theirs: Waypoint, frames: Frames) -> Waypoint | None:
-    """Return a place with its poses in the frame of another; None where that is not known."""
+    """Return a place with its poses in the frame of another; None if unknown."""
     if theirs.frame == mine.frame:
         return theirs
     motion = frames.find_transform(of=theirs.frame, into=mine.frame)
@@ -92,7 +92,7 @@ def _in_frame_of(mine: Waypoint, theirs: Waypoint, frames: Frames) -> Waypoint |
 
 
 def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
-    """Return both as one where that is safe, and what was done, or why not."""
+    """Join both if that is safe; return the result, and what was done or why not."""
     apart_m = mine.pose.point.distance_to(theirs.pose.point)
     if apart_m > SAME_PLACE_M:
         return None, f"they lie {apart_m:.2f} m apart"
@@ -126,7 +126,7 @@ def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
 
 
 def _unordered(place: Waypoint) -> dict[str, object]:
-    """Return what a record says, whatever the order of its lists."""
+    """Return the content of a record, regardless of the order of its lists."""
     said = data_of(place)
     return {key: sorted(map(str, v)) if isinstance(v, list) else v for key, v in said.items()}
 
@@ -139,7 +139,7 @@ def _renamed(place: Waypoint, places: Mapping[str, Waypoint], taken: Collection[
         there = places.get(key)
         if key not in taken or (there and _unordered(there) == _unordered(renamed)):
             return renamed
-    raise AssertionError  # Numbers do not end.
+    raise AssertionError  # There is always a free number.
 
 
 # --- files -----------------------------------------------------------------------------------
@@ -164,10 +164,10 @@ def merge_into(store: MemoryStore, second: SemanticMap) -> Union:
 def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, BroughtOver]:
     """Write two semantic map files as one: the first with its comments, and what it lacks.
 
-    Their maps are aligned by the walls kept beside them; where these do not tell, the second's
-    records stay in a frame of their own.
-    Events of the second one get ids of their own; what is in both is there once. The observations
-    of both come along, with their pictures.
+    Their maps are aligned by the walls kept beside them; if these do not suffice, the second's
+    records stay in a separate frame.
+    Events of the second one get new ids; records in both appear once. The observations of both
+    are copied, with their pictures.
 
     Raises:
         SemanticMapError: One cannot be read, or the new file is there already.
@@ -184,7 +184,7 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
     union = unite(replace(mine.read(), frames=mounted.frames), mounted.rename_places(theirs.read()))
     part = out.with_name(f"{out.stem}.part")
     try:
-        # All that the first file says besides places stays: comments, people's own keys.
+        # The rest of the first file stays: comments, people's own keys.
         shutil.copyfile(first, part)
         _fill(SemanticMapStore(part), union, mounted, theirs.read_events())
         map_id = mine.read().map_id
@@ -196,7 +196,7 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
         )
         for name, grid in mounted.walls.items():
             WallFolder(out).keep(grid, name)
-        # Last, so that no file says what its observations lack.
+        # Last, so that no file exists without its observations.
         part.replace(out)
         sync_folder(out.parent)
     finally:
@@ -207,7 +207,7 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
 
 
 def _fill(whole: SemanticMapStore, union: Union, mounted: Mount, events: Iterable[Event]) -> None:
-    """Write into a copy of the first memory what it lacks."""
+    """Add to a copy of the first memory what it lacks."""
     whole.write_frames(lambda _: mounted.frames)
     whole.write_all(lambda _: union.changed)
     known = [replace(each, id="") for each in whole.read_events()]

@@ -1,4 +1,4 @@
-"""One connection to a PostgreSQL database with the schema of mapspeak, made again when it ends."""
+"""A reconnecting connection to a PostgreSQL database with the schema of mapspeak."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +12,7 @@ from mapspeak.errors import SemanticMapError
 
 CONNECT_TIMEOUT_S = 5
 STATEMENT_TIMEOUT_MS = 10_000
-"""A write waits so long for those before it."""
+"""Longest time that a write waits for those before it."""
 MIGRATIONS = (
     """
     CREATE SCHEMA IF NOT EXISTS mapspeak;
@@ -41,7 +41,7 @@ MIGRATIONS = (
     );
     """,
 )
-"""What each version of the schema adds; all that are missing are run in one transaction."""
+"""Additions of each schema version; all missing ones run in one transaction."""
 
 _MIGRATION_LOCK = 0x6D617073
 
@@ -61,10 +61,10 @@ class Database:
 
     @contextmanager
     def connected(self) -> Iterator[psycopg.Connection[Any]]:
-        """Give the connection; make it, and the schema, where there is none or it has ended.
+        """Return the connection; create it, and the schema, if there is none or it has ended.
 
         Raises:
-            SemanticMapError: The database cannot be reached, or refuses; without its password.
+            SemanticMapError: The database cannot be reached, or refuses; omits the password.
         """
         with self._lock:
             try:
@@ -124,7 +124,7 @@ def shown_address(address: str) -> str:
 
 
 def _migrate(connection: psycopg.Connection[Any]) -> None:
-    """Bring the schema to this version, whoever else begins at the same moment."""
+    """Migrate the schema to this version; safe if other servers do so at the same moment."""
     with connection.transaction():
         connection.execute("SELECT pg_advisory_xact_lock(%s)", (_MIGRATION_LOCK,))
         rows = connection.execute("SELECT to_regclass('mapspeak.schema') IS NOT NULL")

@@ -1,8 +1,8 @@
 """A memory of places in PostgreSQL, for fleets: many servers write, and all read the same.
 
-Every record is a row `(kind, key, said)`, where `said` is what the YAML file would say of it. A row
+Every record is a row `(kind, key, said)`, where `said` is its content in the YAML file. A row
 carries the number of the transaction that changed it; a reader asks for the rows of transactions
-that had not ended when it last asked. What is forgotten stays as a row that says nothing, until
+that had not ended when it last asked. A forgotten record stays as an empty row until
 something is written under its key again.
 """
 
@@ -52,12 +52,12 @@ _FROM_THE_BEGINNING = "0"
 
 @dataclass(frozen=True, kw_only=True)
 class _Known:
-    """What the database said when it was last read.
+    """Content of the database when it was last read.
 
     Attributes:
         rows: Position and transaction of each row, by kind and key.
         records: By kind and key, in the order of positions.
-        faults: Of rows that cannot be read; what they said before is in `records`.
+        faults: Of rows that cannot be read; their previous content is in `records`.
     """
 
     rows: Mapping[tuple[str, str], tuple[int, str]] = field(default_factory=dict)
@@ -112,7 +112,7 @@ class PostgresStore(MemoryStore):
         return tuple(self._look().of(_EVENT).values())
 
     def read_entry(self, key: str) -> str | None:
-        """Return what the memory says under a key of its own."""
+        """Return the entry under one of the memory's own keys."""
         return cast("str | None", self._look().of(_ENTRY).get(key))
 
     def close(self) -> None:
@@ -129,7 +129,7 @@ class PostgresStore(MemoryStore):
         """Change rows in one transaction."""
         is_alone = alone or (binding is not None and not self._is_bound)
         lock = "pg_advisory_xact_lock" if is_alone else "pg_advisory_xact_lock_shared"
-        # In a pipeline, what needs no answer does not wait for one.
+        # In a pipeline, statements without results do not wait.
         with (
             self._database.connected() as connection,
             connection.pipeline(),
@@ -142,15 +142,15 @@ class PostgresStore(MemoryStore):
         return result
 
     def _look(self) -> _Known:
-        """Return what the database says now."""
+        """Return the present content of the database."""
         with self._database.connected() as connection:
             return self._read_news(connection)
 
     def _read_news(self, connection: psycopg.Connection[Any]) -> _Known:
-        """Return what is known with every row that changed."""
+        """Return the known content updated by every changed row."""
         before = self._known or _Known()
         if self._n_connected != self._database.n_connected:
-            # It may be another server now, restored from a copy, with transactions of its own.
+            # It may be another server now, restored from a copy, with other transaction numbers.
             self._n_connected, self._since = self._database.n_connected, _FROM_THE_BEGINNING
             before = _Known()
         rows = connection.execute(_READ_NEWS, (self._since,)).fetchall()

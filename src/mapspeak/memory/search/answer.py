@@ -1,4 +1,4 @@
-"""What can be found, why it was found, and how far to trust the first candidate."""
+"""Search results: candidates, why they were found, and how far to trust the first."""
 
 import math
 from collections import Counter
@@ -26,7 +26,7 @@ class MatchField(StrEnum):
 
 
 class MatchKind(StrEnum):
-    """How a word of the phrase and a word of the record are the same.
+    """Kind of match between a word of the phrase and a word of the record.
 
     A part is "dish" in "dishwasher": a word at one end of a longer one.
     """
@@ -70,12 +70,12 @@ class MatchEvidence:
 
     @property
     def weight(self) -> float:
-        """How much this finding says, up to 1."""
+        """Weight of this match, up to 1."""
         return FIELD_WEIGHTS[self.field] * KIND_WEIGHTS[self.kind]
 
 
 class EntryKind(StrEnum):
-    """What sort of thing is remembered."""
+    """Kind of entry."""
 
     PLACE = "place"
     THING = "thing"
@@ -83,12 +83,12 @@ class EntryKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """A place or a thing, with all that is said of it.
+    """A place or a thing, with its texts.
 
     Attributes:
-        id: What its owner knows it by; no two entries share it.
+        id: The owner's unique key for it.
         place: For a thing, the name of the place where it is.
-        surroundings: What is said of that place.
+        surroundings: Description of that place.
     """
 
     id: str
@@ -105,12 +105,12 @@ class Entry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All that it is called, its own name first."""
+        """All its names, its own first."""
         return (self.name, *self.other_names)
 
     @property
     def texts(self) -> tuple[tuple[MatchField, str], ...]:
-        """All that is said of it, its name first; each text with the part of the record it is."""
+        """All its texts, its name first; each with its part of the record."""
         return tuple((field, text) for field, text in self._fields() if text)
 
     def _fields(self) -> Iterator[tuple[MatchField, str | None]]:
@@ -128,8 +128,8 @@ class Entry:
 def list_entries(semantic_map: SemanticMap) -> tuple[Entry, ...]:
     """Return each place followed by the landmarks seen from it.
 
-    A place is known by the key of its name; its landmark by both keys and, where one label stands
-    there several times, by its number among those.
+    The id of a place is the key of its name; that of a landmark has both keys and, if a label
+    occurs several times there, its number among those.
     """
     return tuple(entry for place in semantic_map.waypoints for entry in _entries_of(place))
 
@@ -164,10 +164,10 @@ def _thing(landmark: Landmark, place: Waypoint, *, id_: str) -> Entry:
 
 
 class Verdict(StrEnum):
-    """How far an answer may be trusted.
+    """Trust in an answer.
 
-    Likely: one fits, but what is remembered of it is not sure. A search of words alone never says
-    that; who knows the views of a thing does.
+    Likely: one fits, but its record is not sure. A search of words alone never returns that; the
+    search of things, which knows their views, does.
     """
 
     FOUND = "found"
@@ -177,7 +177,7 @@ class Verdict(StrEnum):
 
 
 class Basis(StrEnum):
-    """What speaks for a candidate: its name, what it means, or the words said of it."""
+    """Basis of a match: the name, the meaning, or the words of a candidate."""
 
     NAME = "name"
     MEANING = "meaning"
@@ -186,17 +186,17 @@ class Basis(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thresholds:
-    """How likenesses are judged; each way of comparing has a scale of its own.
+    """Thresholds on similarity; each way of comparing has its own scale.
 
-    How sure an answer is, is how alike the request and what is said of the first candidate are,
-    plus how far that is ahead of the first that is called otherwise.
+    The certainty of an answer is the similarity of the request to the texts of the first candidate,
+    plus its lead over the first one with another name.
 
     Attributes:
-        least_ratio: Surer than that something may be meant; else it is not remembered.
-        sure_ratio: As sure as that the first candidate's kind is the one meant.
-        same_ratio: Scores no further apart are as good as equal.
-        absent_ratio: Where a kind of thing that is not remembered is so much more like a request
-            than anything that is, that kind is meant; never where infinite.
+        least_ratio: Certainty above which something may be meant; below, it is not remembered.
+        sure_ratio: Certainty from which the first candidate's kind is the one meant.
+        same_ratio: Scores no further apart count as equal.
+        absent_ratio: Lead in similarity from which a kind that is not remembered is the one meant;
+            never if infinite.
     """
 
     least_ratio: float
@@ -210,11 +210,11 @@ class EntryCandidate:
     """Something that a request may mean.
 
     Attributes:
-        score_ratio: How alike it and the request are; 1 for its very name.
-        field: Which part of the record is most like the request.
-        evidence: The words of the request that the record says.
-        said_ratio: How much of the request the record says word for word; rare words and names
-            count more, parts of words nothing.
+        score_ratio: Similarity to the request; 1 for its exact name.
+        field: The part of the record most similar to the request.
+        evidence: The words of the request that the record contains.
+        said_ratio: Share of the request that the record contains word for word; rare words and
+            names count more, parts of words nothing.
     """
 
     entry: Entry
@@ -228,17 +228,17 @@ class EntryCandidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """What is remembered of a request.
+    """Answer to a request.
 
     Attributes:
-        understood: The same with misspelt words put right.
-        verdict: How far to trust the first candidate. Where nothing is remembered the candidates
-            are only the nearest things, and probably none of them is meant.
-        n_meant: How many, of all that is remembered, fit as well as the first.
-        is_sure: Whether what is meant is called as the first is, however many of it there are.
-        limits: What the search could not do, in words; None where nothing was missing.
-        missing: A kind of thing that is not remembered and more like the request than anything
-            that is; None where there is none, or no model to compare them.
+        understood: The request with misspelt words corrected.
+        verdict: Trust in the first candidate. If nothing is remembered, the candidates are only
+            the most similar things, and probably not meant.
+        n_meant: Number of remembered entries that fit as well as the first.
+        is_sure: The name of the first is the one meant, though several may share it.
+        limits: Limitations of the search, in words; None without any.
+        missing: A kind that is not remembered and more similar to the request than anything
+            remembered; None without one, or without a model.
     """
 
     query: str
@@ -251,7 +251,7 @@ class Answer:
     missing: str | None = None
 
     def find_speaking(self, *, least_said_ratio: float) -> tuple[EntryCandidate, ...]:
-        """Return the candidates that are surely meant, or that say enough of the request."""
+        """Return the candidates that are surely meant, or contain enough of the request."""
         n_sure = self.n_meant if self.is_sure else 0
         return tuple(
             each
