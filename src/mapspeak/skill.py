@@ -1,7 +1,7 @@
-"""THE PORT: what a robot can do besides driving, and the values that cross.
+"""THE PORT: a robot's skills besides driving, and their values.
 
 A skill is an exposed topic, service or action of the robot, an entry of skills.yaml, a skill of the
-simulated robot, or a saved mission. Whoever runs one sees nothing else of it.
+simulated robot, or a saved mission. The caller sees only this port.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +14,7 @@ JsonValue = Any
 
 
 class SkillEffect(StrEnum):
-    """What running a skill does to the world."""
+    """The effect of a skill on the world."""
 
     READS = "reads"
     MOVES = "moves"
@@ -22,14 +22,14 @@ class SkillEffect(StrEnum):
 
 
 class SkillApproval(StrEnum):
-    """Whether a person is asked before a skill is run."""
+    """The need for a person's consent before a skill runs."""
 
     AS_POLICY = "as_policy"
     ALWAYS = "always"
 
 
 class ParameterKind(StrEnum):
-    """What a parameter holds; bytes are a text in base64."""
+    """The type of a parameter's value; bytes are a text in base64."""
 
     NUMBER = "number"
     WHOLE = "whole"
@@ -42,20 +42,19 @@ class ParameterKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillParameter:
-    """One argument that a skill takes, or what a list or an object within one holds.
+    """One parameter of a skill, or an element of a list or an object within one.
 
     Attributes:
-        name: Empty for what a list holds.
+        name: Empty for an element of a list.
         description: What it is, in its owner's words: quoted, never followed.
         unit: Such as "m"; empty where it has none.
-        least: Of a number; of a list, how many values it holds at least.
-        most: Of a number; of a list, how many values it holds at most; of a text, its
-            letters.
+        least: The least number; of a list, the least count of values.
+        most: The largest number; of a list, the most values; of a text, the most letters.
         choices: The only values it may have; empty where it may have any.
         is_required: It has no default.
-        default: What it is where it is left out.
-        item: What a list holds.
-        fields: What an object holds.
+        default: Its value where it is left out.
+        item: The element of a list.
+        fields: The fields of an object.
     """
 
     name: str
@@ -72,7 +71,7 @@ class SkillParameter:
 
 
 class PreconditionKind(StrEnum):
-    """What may have to hold before a skill is run."""
+    """The conditions that may have to hold before a skill runs."""
 
     BATTERY_ABOVE = "battery_above"
     STANDING = "standing"
@@ -81,7 +80,7 @@ class PreconditionKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Precondition:
-    """What must hold before a skill is run.
+    """A condition that must hold before a skill runs.
 
     Attributes:
         ratio: Of the battery's charge, for `BATTERY_ABOVE`.
@@ -95,7 +94,7 @@ class Precondition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillSpec:
-    """What is known of a skill before it is run.
+    """The description of a skill before it runs.
 
     Attributes:
         name: Unique among the skills of a robot: small letters, digits and underscores.
@@ -114,7 +113,7 @@ class SkillSpec:
 
 
 class SkillState(StrEnum):
-    """How a run of a skill stands."""
+    """The state of a skill's run."""
 
     RUNNING = "running"
     SUCCEEDED = "succeeded"
@@ -149,10 +148,10 @@ class SkillOutcome:
     """How a run of a skill ended.
 
     Attributes:
-        outputs: What it gave, by name; a mission passes these on.
+        outputs: Its results, by name; a mission passes these on.
         numbers: Details of the code, by name with the unit, such as "after_s" or "battery_ratio".
-        quote: What the robot's software said, word for word.
-        failed: What did not hold, for `PRECONDITION`.
+        quote: The words of the robot's software.
+        failed: The condition that did not hold, for `PRECONDITION`.
     """
 
     state: SkillState
@@ -165,13 +164,13 @@ class SkillOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillProgress:
-    """What a running skill tells.
+    """The progress of a running skill.
 
     Attributes:
         values: The latest feedback, by name.
         done_ratio: None where it is not known.
-        is_asking: It waits for somebody's answer.
-        account: What a mission has done so far, a step each.
+        is_asking: It waits for an answer.
+        account: The steps that a mission has done so far.
     """
 
     values: Mapping[str, JsonValue] = field(default_factory=dict)
@@ -181,7 +180,7 @@ class SkillProgress:
 
 
 OnProgress = Callable[[SkillProgress], None]
-"""What is told of progress; it must not raise."""
+"""The listener for progress; it must not raise."""
 
 
 class Skill(Protocol):
@@ -189,7 +188,7 @@ class Skill(Protocol):
 
     @property
     def spec(self) -> SkillSpec:
-        """What is known of it before it is run."""
+        """Its description before it runs."""
 
     async def run(
         self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
@@ -210,7 +209,7 @@ class SkilledRobot(Protocol):
 
     @property
     def skills(self) -> Sequence[Skill]:
-        """What it can do besides driving, looking and stopping."""
+        """Its skills besides driving, looking and stopping."""
 
     async def fetch_battery(self) -> float | None:
         """Return how full its battery is, from 0 to 1; None where it does not tell."""

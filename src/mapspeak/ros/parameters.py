@@ -38,7 +38,7 @@ class ParameterServices(ABC):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return what a service answers."""
+        """Return the answer of a service."""
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
         """Return the names of a node's parameters, in their order."""
@@ -58,7 +58,7 @@ class ParameterServices(ABC):
         return found.tolist() if isinstance(found, np.ndarray) else found
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Set a node's parameter; a whole number becomes a double where the node keeps doubles.
+        """Set a node's parameter; convert a whole number to a double where the node keeps doubles.
 
         None deletes it, which a node allows only for what it has not declared.
         """

@@ -9,8 +9,8 @@ from mapspeak.robot import SCAN_PATIENCE_S
 class Patience:
     """The limits of one connection, in wall time; a test shortens them.
 
-    Between nodes on Fast DDS, a message that was lost comes again after three seconds: to wait for
-    less would be to take a lost message for a silent robot.
+    Between nodes on Fast DDS, a lost message comes again after three seconds: a shorter wait would
+    take a lost message for a silent robot.
 
     Attributes:
         settling_s: After connecting, without anything new, until all that is there is found.

@@ -1,4 +1,4 @@
-"""What a connection to a ROS system can do, and what it tells of nodes and topics."""
+"""The port to a ROS system, and its values for nodes and topics."""
 
 import difflib
 import uuid
@@ -19,7 +19,7 @@ def new_id() -> str:
 
 
 def find_nearest(name: str, names: Iterable[str], *, most: int = 3) -> list[str]:
-    """Return the names most like one, the most alike first: what somebody may have meant."""
+    """Return the names most like a misspelled one, the most alike first."""
     known = list(names)
     last = name.rstrip("/").rpartition("/")[2].lower()
     ending = [each for each in known if last and each.lower().endswith(f"/{last}")]
@@ -49,7 +49,7 @@ class RosGraph:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeLinks:
-    """What one node has to do with."""
+    """The topics and services of one node."""
 
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
@@ -57,7 +57,7 @@ class NodeLinks:
 
 
 class LinkKind(StrEnum):
-    """What connects us to a ROS system."""
+    """The kinds of connections to a ROS system."""
 
     ROSBRIDGE = "rosbridge"
     RCLPY = "rclpy"
@@ -78,13 +78,13 @@ class LinkName:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnEnds:
-    """What of a ROS system is our own doing.
+    """The part of a ROS graph that is our own.
 
     Attributes:
-        node: The last part of the name of the node that speaks and listens for us; empty where no
-            node is told that does.
+        node: The last part of the name of the node that publishes and subscribes for us; empty
+            where the graph shows none.
         publishes: Topics that it publishes for us.
-        hears: Topics that it listens to for us.
+        hears: Topics that it subscribes to for us.
     """
 
     node: str = ""
@@ -96,7 +96,7 @@ class RosConnection(Protocol):
     """One ROS system, kept connected. Waiting is limited in wall time; a limit closes nothing.
 
     Methods raise `LinkError` when the system cannot be reached or does not answer, and when a
-    message, a name or a type is none.
+    message, a name or a type is invalid.
     """
 
     @property
@@ -105,7 +105,7 @@ class RosConnection(Protocol):
 
     @property
     def patience(self) -> Patience:
-        """How long to wait for what, on this connection."""
+        """The time limits of this connection."""
 
     @property
     def is_open(self) -> bool:
@@ -121,7 +121,7 @@ class RosConnection(Protocol):
 
     @property
     def own_ends(self) -> OwnEnds:
-        """What of the system is our own doing: answers about it do not take it for others'."""
+        """Our own part of the graph: answers about the graph do not take it for others'."""
 
     @property
     def started(self) -> Started:
@@ -141,7 +141,7 @@ class RosConnection(Protocol):
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> Subscription:
-        """Return the subscription to a topic, which is begun where there is none yet.
+        """Return the subscription to a topic; begin one where there is none yet.
 
         The type is as this ROS writes it; None looks it up. Bulky messages hold large arrays: maps,
         scans, pictures. Throttling keeps a least time between two messages.
@@ -156,23 +156,23 @@ class RosConnection(Protocol):
     def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
         """Say that we will publish; the robot needs a moment until it listens.
 
-        Who subscribes late to a latched topic ("transient local") gets what was published last.
+        A late subscriber of a latched topic ("transient local") gets the last message.
         """
 
     def unadvertise(self, topic: str) -> None:
-        """Take back what `advertise` said; do nothing for what was not advertised."""
+        """Take back an advertisement; do nothing for a topic that was not advertised."""
 
     def advertise_late(self) -> None:
-        """Tell the robot of what is advertised from now on only with the first message there.
+        """Tell the robot of each topic advertised from now on only with its first message.
 
-        For one that is only watched: it should not look as if we drove it. A stop is then said for
-        a second, until the robot has noticed who speaks.
+        For a robot that is only watched: it should not look as if we drove it. Zero velocity is
+        then repeated for a second, until the robot has discovered our publisher.
         """
 
     def advertise_early(self) -> None:
-        """Tell the robot at once of all that is advertised, now and from now on.
+        """Tell the robot at once of all advertised topics, now and from now on.
 
-        For whoever may move it, so that a stop is heard at once; so it is from the beginning.
+        For clients that may move it, so that a stop is received at once. This is the default.
         """
 
     async def publish(self, topic: str, message: Message) -> None:
@@ -189,22 +189,22 @@ class RosConnection(Protocol):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return what a service answers.
+        """Return the answer of a service.
 
         Where no type is given it is looked up; where no limit is, the usual one is taken.
         """
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""
+        """Send a goal to an action of ROS 2 and return the goal, updated as its state changes."""
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Ask for the end of a goal; its `end` tells if that worked.
+        """Ask the server to cancel a goal; the goal's `end` tells whether it did.
 
-        One that is withdrawn holds up nothing from then on; what is heard of it is told on.
+        A withdrawn goal blocks no other from then on; its news are still passed on.
         """
 
     def clear_the_way(self) -> None:
-        """Make sure that what is sent next is not held up by what was sent before: for a stop."""
+        """Make sure that earlier messages do not delay the next one: for a stop."""
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are."""
@@ -219,7 +219,7 @@ class RosConnection(Protocol):
         """Return the full names of all nodes, in their order."""
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Return what a node publishes, subscribes to and serves."""
+        """Return the topics and services that a node publishes, subscribes to and serves."""
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish on a topic."""
@@ -259,7 +259,7 @@ class RosConnection(Protocol):
 
 
 def started_over(connection: RosConnection | None) -> Started:
-    """Return what was started over a connection; nothing where there is none, or not yet."""
+    """Return everything started over a connection; nothing without a connection."""
     try:
         return Started() if connection is None else connection.started
     except LinkError:

@@ -15,7 +15,7 @@ from mapspeak.ros.port import RosConnection
 
 MAX_FRAMES = 10_000
 CLOCK_JUMP_S = 10.0
-"""A transform this much older than the last one is no latecomer: the robot's clock was set back."""
+"""A transform this much older than the last one is not late: the robot's clock was set back."""
 TF_HINT = (
     "Start SLAM or localisation (slam_toolbox, Cartographer, AMCL, gmapping) and the robot's "
     "drivers; `ros2 run tf2_tools view_frames` (ROS 1: `rosrun tf view_frames`) draws the tree."
@@ -57,7 +57,7 @@ class TransformTree:
         Its stamp is that of the oldest part that moves; 0 where nothing moves.
 
         Raises:
-            LinkError: There is no such way, or it goes round in a circle.
+            LinkError: There is no such chain of frames, or it is a circle.
         """
         outer_from_inner = Pose(0.0, 0.0, 0.0)
         stamps: list[float] = []

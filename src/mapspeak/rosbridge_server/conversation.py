@@ -1,4 +1,4 @@
-"""One client's operations, on goals too: done as asked, and what is wrong mostly not told."""
+"""One client's operations, on goals too: carried out, and mostly without a report of errors."""
 
 import re
 from collections.abc import Awaitable, Iterable, Mapping
@@ -42,7 +42,7 @@ TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?", re.ASCII)
 
 @dataclass(slots=True)
 class ClientSubscription:
-    """What a client asked for on one topic; each of its ids with the options that came with it."""
+    """A client's subscription to one topic; each of its ids with the options that came with it."""
 
     options: dict[str, Operation] = field(default_factory=dict)
 
@@ -65,7 +65,7 @@ class ClientSubscription:
 
 
 class ClientConversation:
-    """What one client has subscribed to, advertised and started.
+    """The subscriptions, advertisements and goals of one client.
 
     Args:
         tasks: Ends with the client.
@@ -281,14 +281,14 @@ class ClientConversation:
     # --- inside ---
 
     def _is_broken(self, compression: Compression, message_type: str) -> bool:
-        """Return True for what rosbridge on ROS 2 cannot send: png, lists of fixed length."""
+        """Return True for what rosbridge on ROS 2 fails to send: png, lists of fixed length."""
         if self._stack.dialect is Dialect.ROS1 or compression is Compression.NONE:
             return False
         has_fixed_array = self._stack.interfaces.has_fixed_array
         return compression is Compression.PNG or has_fixed_array(message_type)
 
     def _checked_type(self, topic: str, given: object) -> str:
-        """Return the topic's type; what is given must be that type, in either ROS's words."""
+        """Return the topic's type; a given type must be the same, as either ROS writes it."""
         known = self._stack.hub.find(topic)
         if given is None and known is not None:
             return known.type

@@ -23,7 +23,7 @@ class ServedDrive:
 
     Attributes:
         goal_id: The client's, or one made here.
-        robot_goal_id: The robot's; None for a goal in a frame that nobody knows.
+        robot_goal_id: The robot's; None for a goal in an unknown frame.
         started_s: Robot time.
         operation_id: Of rosbridge's operation that waits for its end.
         follow: Takes the feedback for that operation.
@@ -40,7 +40,7 @@ class ServedDrive:
 
 
 class Drives:
-    """All goals; whoever listens is called for each that begins, goes on, or ends."""
+    """All goals; listeners are called for each that begins, goes on, or ends."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -59,7 +59,7 @@ class Drives:
         return [drive for drive in self._drives if not drive.is_over.is_set()]
 
     async def resolve(self, framed: FramedPose) -> Pose | None:
-        """Return a pose in the map; None for a frame that nobody knows."""
+        """Return a pose in the map; None for an unknown frame."""
         if framed.frame_id in ("map", "odom"):
             return framed.pose
         if framed.frame_id in ("base_link", BASE_FRAME):

@@ -1,4 +1,4 @@
-"""The topics of the robot and of its clients, who hears them, and what waits to go out: bounded."""
+"""The topics of the robot and of its clients, their subscribers, and bounded output queues."""
 
 import base64
 import io
@@ -79,7 +79,7 @@ def answer_frame(operation: Message, answer: Message) -> Frame:
 
 
 def fragments_of(frame: Frame, *, length: int, fragment_id: str) -> Iterator[Frame]:
-    """Return a text in pieces of so many characters, as the operation `fragment`."""
+    """Return a text in pieces of a given length, as the operation `fragment`."""
     text = frame.data.decode()
     for number, start in enumerate(range(0, len(text), length)):
         piece = {
@@ -155,7 +155,7 @@ class Outbox:
         self._lanes[topic] = lane
 
     def close_lane(self, topic: str) -> None:
-        """Forget a topic and what waits on it."""
+        """Forget a topic and its waiting messages."""
         self._lanes.pop(topic, None)
 
     def reply(self, frame: Frame) -> None:
@@ -203,8 +203,8 @@ class Topic:
     Attributes:
         name: With its leading slash.
         type: Of its messages, as "package/Type".
-        is_latched: Who subscribes later gets the last message at once.
-        depth: How many messages wait for a client that is slow; the newest stay.
+        is_latched: A late subscriber gets the last message at once.
+        depth: How many messages wait for a slow client; the newest stay.
     """
 
     name: str
@@ -228,7 +228,7 @@ class Hub:
 
     @property
     def topics(self) -> list[Topic]:
-        """The topics that somebody publishes or hears, by name."""
+        """The topics with a publisher or a subscriber, by name."""
         return sorted(self._topics.values(), key=lambda topic: topic.name)
 
     def find(self, name: str) -> Topic | None:
@@ -240,7 +240,7 @@ class Hub:
         return name in self._topics and bool(self._topics[name].listeners)
 
     def publish(self, name: str, message: Message) -> None:
-        """Hand a message to all who hear the topic."""
+        """Hand a message to all subscribers of the topic."""
         topic = self._topics[name]
         publication = Publication(name, topic.type, message)
         if topic.is_latched:

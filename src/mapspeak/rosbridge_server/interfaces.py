@@ -41,7 +41,7 @@ class Interfaces:
         return sorted({GENERATED.sub("", self.said(name)) for name in self._book.texts})
 
     def said(self, name: str) -> str:
-        """Return a type's name as this ROS writes it; one that is no message keeps its name."""
+        """Return a type's name as this ROS writes it; keep a name without a package."""
         is_said = "/" not in name or self._dialect is Dialect.ROS1
         return name if is_said else name_in_ros2(name)
 
@@ -65,14 +65,14 @@ class Interfaces:
         return write_definition(self._book.texts, self._book.within(name))
 
     def details(self, name: str) -> list[dict[str, object]]:
-        """Return what rosapi's message_details says of a type and of all types within."""
+        """Return rosapi's message_details of a type and of all types within."""
         return [self._detail(each) for each in self._book.within(name)]
 
     def fill(self, name: str, message: object) -> dict[str, Any]:
         """Return a client's message with all fields; those left out hold their defaults.
 
         Raises:
-            LinkError: A field is not of that type, or does not hold what it should.
+            LinkError: A field is not of that type, or its value does not fit.
         """
         if not isinstance(message, Mapping):
             raise _misfit(name, "message", message)
@@ -142,7 +142,7 @@ LOGGED_ERROR = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Service:
-    """One service; it never answers where there is no function that does."""
+    """One service; without a function it never answers."""
 
     name: str
     type: str
@@ -151,7 +151,7 @@ class Service:
 
 
 class RosSystem:
-    """What clients find.
+    """The ROS system that clients find.
 
     Attributes:
         hub: Its topics; on ROS 1 /rosout is one of them.
@@ -175,7 +175,7 @@ class RosSystem:
         self._services[name] = Service(name=name, type=type_name, node=node, answer=answer)
 
     def withdraw(self, name: str) -> None:
-        """Offer a service no longer; do nothing for what is not offered."""
+        """Withdraw a service; do nothing for one that is not offered."""
         self._services.pop(name, None)
 
     def offer_typed(self, name: str, type_name: str, *, node: str, answer: Answer) -> None:
@@ -193,11 +193,11 @@ class RosSystem:
         return self._services.get(f"/{name.strip('/')}")
 
     async def keep_going(self, *, task_status: anyio.abc.TaskStatus[None]) -> None:
-        """Do what it does by itself, until cancelled: this one does nothing."""
+        """Run its own activity until cancelled: this one does nothing."""
         task_status.started()
 
     def complain(self, text: str) -> None:
-        """Say what was wrong with an operation where rosbridge says it: on ROS 1, to /rosout."""
+        """Report a faulty operation where rosbridge does: on ROS 1, to /rosout."""
         if self.dialect is Dialect.ROS1:
             said = text[:LONGEST_COMPLAINT].encode(errors="replace").decode()
             entry = {"level": LOGGED_ERROR, "name": ROSBRIDGE_NODE, "msg": said}

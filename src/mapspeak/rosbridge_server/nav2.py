@@ -59,7 +59,7 @@ class Nav2:
         return await self._drives.start(goal)
 
     async def take_goal_pose(self, publication: Publication) -> None:
-        """Start a drive for what was published on /goal_pose; errors are silent there."""
+        """Start a drive to a pose from /goal_pose; errors are silent there."""
         try:
             await self.navigate({"pose": publication.message})
         except MapspeakError:

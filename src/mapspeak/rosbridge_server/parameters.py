@@ -10,10 +10,10 @@ ROS1_DISTRIBUTION = "noetic\n"
 
 
 class Parameters:
-    """All parameters: what they hold can be read and set, and changes nothing on the robot.
+    """All parameters: their values can be read and set, without an effect on the robot.
 
     Args:
-        dialect: Whose names are used: "/node/name" on ROS 1, "/node:name" on ROS 2.
+        dialect: The form of their names: "/node/name" on ROS 1, "/node:name" on ROS 2.
         by_node: Values by the names of nodes and their own.
     """
 
@@ -61,7 +61,7 @@ class Parameters:
 
 
 def add_parameter_services(system: RosSystem, parameters: Parameters) -> None:
-    """Offer for each node what every node of ROS 2 offers about its parameters."""
+    """Offer for each node the parameter services of every ROS 2 node."""
     for node in parameters.nodes:
         for name, answer in _answers_of(node, parameters, system.interfaces).items():
             last = name.title().replace("_", "")

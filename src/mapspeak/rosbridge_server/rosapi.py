@@ -1,4 +1,4 @@
-"""The services of rosapi: a table of what there is on the robot, by the name of the question."""
+"""The services of rosapi: answers about the robot's graph, by the name of the service."""
 
 import contextlib
 import json

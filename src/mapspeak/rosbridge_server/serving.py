@@ -131,7 +131,7 @@ def open_rosbridge_server(
 
 
 async def _serve_client(socket: ServerConnection, system: RosSystem, *, blocks: bool) -> None:
-    """Serve one client until it hangs up; what it does is no matter to the others."""
+    """Serve one client until it hangs up, without an effect on the others."""
     async with anyio.create_task_group() as tasks:
         outbox = Outbox(tasks.cancel_scope.cancel)
         conversation = ClientConversation(system, outbox, tasks, blocks=blocks)

@@ -1,4 +1,4 @@
-"""What the robot's nodes publish, taken from the port as often as its clock says."""
+"""The publications of the robot's nodes, taken from the port in time with its clock."""
 
 import math
 from collections.abc import Awaitable, Callable
@@ -74,7 +74,7 @@ class Sources:
             self._slow.append(Source(self._publish_battery, BATTERY_PERIOD_S))
 
     async def start(self) -> None:
-        """Publish what is latched, so that the first client finds it."""
+        """Publish the latched topics, so that the first client finds them."""
         fixed = [("base_link", BASE_FRAME), (CAMERA_FRAME, "base_link")]
         if self._robot.description.has_laser:
             fixed.append((LASER_FRAME, "base_link"))
@@ -86,7 +86,7 @@ class Sources:
         await self._attempt(self._publish_map)
 
     async def publish_due(self, tasks: TaskGroup) -> None:
-        """Publish what is due; what takes long is done aside."""
+        """Publish the topics that are due; slow ones run aside."""
         now_s = self._robot.now_s
         if self._hub.is_wanted("/clock"):
             self._hub.publish("/clock", {"clock": write_stamp(now_s, dialect=self._dialect)})

@@ -113,7 +113,7 @@ def parameters_of(dialect: Dialect, *, radius_m: float) -> Parameters:
 
 
 class RosStack(RosSystem):
-    """What a robot and its ROS would be.
+    """The stand-in for a robot and its ROS.
 
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
@@ -188,7 +188,7 @@ class RosStack(RosSystem):
             self._navigation.publish_feedback(drive, in_map)
 
     def _take(self, topic: str, handle: Callable[[Publication], Coroutine[Any, Any, None]]) -> None:
-        """Let the robot act on a topic; whoever published does not wait for it."""
+        """Let the robot act on a topic, without making the publisher wait."""
 
         def act(publication: Publication) -> None:
             self._tasks.start_soon(handle, publication)
@@ -196,7 +196,7 @@ class RosStack(RosSystem):
         self.hub.take(topic, act)
 
     async def _take_velocity(self, publication: Publication) -> None:
-        """Stop on zero; the port knows no other velocity, and what it cannot do it leaves."""
+        """Stop on zero velocity; ignore others, which the port cannot command."""
         try:
             if read_twist(publication.message).is_standing:
                 await self._robot.stop()

@@ -1,1 +1,1 @@
-"""The MCP surface: tools, and all words for the model. What loads it all is `server.app`."""
+"""The MCP surface: tools, and all words for the model. `server.app` loads it all."""

@@ -55,18 +55,18 @@ MOST_BYTES = 1_000_000
 
 
 class MapspeakServer(MCPServer[Any]):
-    """An MCP server whose every call passes one door: the client is heard, errors are readable.
+    """An MCP server with one entry for every call: it notes the client and makes errors readable.
 
     Args:
-        session: What the tools work on.
+        session: The session of the tools.
         runs: The runs of its skills.
-        instructions: What a model reads before its first call.
+        instructions: The text that a model reads before its first call.
         call_log: Where every call is noted; None for nowhere.
 
     Attributes:
         skills: The tools that come and go.
-        hearers: Who is told when they do.
-        exposure: Looks for those that the robot offers; None where none are wanted.
+        hearers: The clients to notify of these changes.
+        exposure: Looks for those that the robot offers; None without patterns.
     """
 
     def __init__(
@@ -100,11 +100,11 @@ class MapspeakServer(MCPServer[Any]):
 
     @property
     def n_tools(self) -> int:
-        """How many tools it offers."""
+        """The number of offered tools."""
         return len(self._arguments)
 
     def expose(self, ros: RosAccess, patterns: tuple[str, ...]) -> None:
-        """Look for what the robot offers of some names, once `keep_skills` runs."""
+        """Look for interfaces of the robot with some names, once `keep_skills` runs."""
         self.exposure = Exposure(ros, self.skills, patterns, tell=self.hearers.tell)
 
     async def keep_skills(self) -> None:
@@ -115,7 +115,7 @@ class MapspeakServer(MCPServer[Any]):
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
-        """Call a tool; what went wrong on purpose reaches the model with its hint."""
+        """Call a tool; a `MapspeakError` reaches the model with its hint."""
         if name == VIEW_MAP:
             return await super().call_tool(name, arguments, context)
         former = self._former.get(name, {})
@@ -163,7 +163,7 @@ class MapspeakServer(MCPServer[Any]):
             return show_controls_of(told)
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
-        """Note in the audit log that a tool has changed what is remembered."""
+        """Note in the audit log that a tool has changed the memory."""
         guard = self._session.guard
         if guard is not None and name in self._remembering:
             what = arguments.get("name") or arguments.get("text") or arguments.get("event") or name
@@ -173,7 +173,7 @@ class MapspeakServer(MCPServer[Any]):
     async def _call_with_approval(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
-        """Call a tool, and once more when a person has agreed to what it needs their word for."""
+        """Call a tool, and once more when a person has approved its request."""
         guard = self._session.guard
         if guard is None:
             return await self._run(name, arguments, context)
@@ -233,7 +233,7 @@ class MapspeakServer(MCPServer[Any]):
     def _check_arguments(self, name: str, given: dict[str, Any]) -> None:
         """Refuse what would be dropped without a word, such as yaw, or taken for 1, as true is.
 
-        What is too large would cut the connection to a robot, which limits the size of a message.
+        Too large arguments would cut the connection to a robot, which limits the size of a message.
         """
         try:
             n_bytes = len(json.dumps(given, default=str, ensure_ascii=False).encode())
@@ -253,7 +253,7 @@ class MapspeakServer(MCPServer[Any]):
             raise ToolError(f"{name} wants a number for {', '.join(wrong)}, not true or false.")
 
     async def note_hang_up(self, client: str) -> None:
-        """Stop a drive, and end skills, that nobody is there for any more."""
+        """Stop the drive and end the skills of a client that is gone."""
         await self._session.client_is_gone(client)
         await self.skills.runs.client_is_gone(client)
 
@@ -264,7 +264,7 @@ class MapspeakServer(MCPServer[Any]):
         return offer_page(await super()._handle_list_tools(ctx, params), ctx)
 
     async def list_tools(self) -> list[ListedTool]:
-        """List the tools with schemas freed of what no model needs."""
+        """List the tools with schemas freed of parts that no model needs."""
         listed = await super().list_tools()
         lean = [
             tool.model_copy(
@@ -289,7 +289,7 @@ def _read_list(text: str) -> list[Any]:
 
 
 def name_client(context: Context[Any, Any] | None) -> str:
-    """Return who calls, for the audit log: the client's own name and its HTTP session."""
+    """Return the caller's name for the audit log: the client's own name and its HTTP session."""
     if context is None:
         return "unknown"
     about = context.session.client_params
@@ -315,7 +315,7 @@ def build_server(
         session: What the tools work on.
         toolsets: Names of the groups to offer.
         tools: Single tools to offer besides.
-        is_read_only: Leaves out every tool that changes something; stopping stays.
+        is_read_only: Leaves out every tool that changes anything; stopping stays.
         representation: How look_at_map shows the map.
         call_log: Where every call is noted; None for nowhere.
         expose: Patterns of names that are tools too while the robot offers them.
@@ -351,7 +351,7 @@ def build_server(
 
 
 def _count_stops(session: Session) -> int:
-    """Return a number that changes when somebody stops the robot, or holds it."""
+    """Return a number that changes when the robot is stopped or held."""
     is_held = session.guard is not None and session.guard.hold.read() is not None
     return 2 * session.drives.n_stops + is_held
 

@@ -94,7 +94,7 @@ class FleetServer(MCPServer[Any]):
         return await server.call_tool(name, own, context)
 
     async def note_hang_up(self, client: str) -> None:
-        """Stop drives that nobody is there for any more."""
+        """Stop the drives of a client that is gone."""
         for server in self._servers.values():
             await server.note_hang_up(client)
 
@@ -103,7 +103,7 @@ class FleetServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         """Stop all at once: one that does not answer holds up none of the others.
 
-        It takes no robot's name, so that nobody has to think in a hurry.
+        It takes no robot's name, so that no choice is needed in a hurry.
         """
         said: dict[str, str] = {}
 

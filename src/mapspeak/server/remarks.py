@@ -1,4 +1,4 @@
-"""What an answer tells besides: what was remembered before, and ids that mean something else."""
+"""Remarks added to an answer: the earlier memory, and ids that mean something else by now."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -14,10 +14,10 @@ from mapspeak.session import Session
 
 
 class Remarks:
-    """What each client has to be told that it did not ask for.
+    """Remarks that each client gets unasked.
 
     Args:
-        session: Whose memory it is.
+        session: The session with the memory.
     """
 
     def __init__(self, session: Session) -> None:
@@ -25,18 +25,18 @@ class Remarks:
         self._found: dict[str, SemanticMap | None] = {}
 
     async def meet(self, client: str) -> None:
-        """Note what is remembered before the first call of a client."""
+        """Note the memory before the first call of a client."""
         if client not in self._found:
             try:
                 self._found[client] = await self._session.compute(self._session.memory.read)
             except SemanticMapError:
-                # The tools tell what is wrong with it.
+                # The tools report its faults.
                 self._found[client] = None
 
     async def tell(
         self, client: str, arguments: Mapping[str, Any], answer: CallToolResult
     ) -> CallToolResult:
-        """Put first what became of ids that were named, and what was found at first contact."""
+        """Prepend the new meanings of named ids, and the memory found at first contact."""
         answer = await self._tell_found(client, answer)
         renamed = await self.say_renamed(arguments)
         if not renamed:

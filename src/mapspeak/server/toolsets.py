@@ -38,7 +38,7 @@ def build_toolsets(
     """Return every toolset by its name, in the order in which tools are listed.
 
     Args:
-        session: What the tools work on.
+        session: The session of the tools.
         representation: How look_at_map shows the map.
         ros: Its way to a ROS system, where there is one.
         runs: The runs of its skills.
@@ -98,7 +98,7 @@ def choose_tools(
     if any(tool.effect is ToolEffect.MOVES for tool in chosen) and STOP not in {
         tool.name for tool in chosen
     }:
-        # Whoever can start the robot can stop it.
+        # A client that can start the robot can stop it.
         return choose_tools(
             known, toolsets=chosen_sets, tools={*chosen_tools, STOP}, is_read_only=is_read_only
         )

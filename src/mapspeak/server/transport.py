@@ -122,8 +122,8 @@ def shorten_disconnect(record: logging.LogRecord) -> bool:
 class HangUpWatch:
     """Notices a client that is gone before its answer was, or that ends its session.
 
-    Nobody else tells a running tool. Clients are told apart by their session; those of a protocol
-    without sessions count as one.
+    A running tool does not learn of it otherwise. Clients are told apart by their session; those of
+    a protocol without sessions count as one.
     """
 
     def __init__(self, app: ASGIApp, on_hang_up: Callable[[str], Awaitable[None]]) -> None:

@@ -1,4 +1,4 @@
-"""What is given to a skill, held against the parameters that it takes."""
+"""The arguments given to a skill, checked against its parameters."""
 
 import difflib
 import math
@@ -22,10 +22,10 @@ WANTED = {
 def check_arguments(
     parameters: Sequence[SkillParameter], arguments: Mapping[str, JsonValue], *, skill: str
 ) -> dict[str, JsonValue]:
-    """Return the arguments of a skill, with defaults for what was left out.
+    """Return the arguments of a skill, with defaults for missing ones.
 
     Raises:
-        SkillError: They do not fit; says which, and what is wanted of it.
+        SkillError: They do not fit; names which, and what it must be.
     """
     return _check_fields(parameters, arguments, path="", what=skill)
 
@@ -60,7 +60,7 @@ def check_value(parameter: SkillParameter, value: JsonValue, *, where: str, what
     """Return one argument as its parameter holds it.
 
     Args:
-        where: The name of the argument, or the way to the part of it.
+        where: The name of the argument, or the path to a part of it.
         what: The skill's name.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Values of results compared with what is wanted of them."""
+"""Values of results compared with required ones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ def plain(value: JsonValue) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What has to hold of one field of a result.
+    """A condition on one field of a result.
 
     Attributes:
-        equals: Its value, however it is written; None where any will do.
+        equals: Its value, in any notation; None where any will do.
         above: It is a number above this.
         below: It is a number below this.
     """

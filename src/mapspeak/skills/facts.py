@@ -1,4 +1,4 @@
-"""What conditions of skills and missions are about, and how long something has taken."""
+"""The facts that conditions of skills and missions check, and a stopwatch in robot time."""
 
 from collections.abc import Iterable
 from datetime import datetime
@@ -15,7 +15,7 @@ STILL_S = 1.0
 
 
 class Facts(Protocol):
-    """What is so now, as far as the robot and its memory know."""
+    """The present facts, as far as the robot and its memory know."""
 
     @property
     def now_s(self) -> float:
@@ -47,7 +47,7 @@ class Facts(Protocol):
 
 
 async def find_unmet(preconditions: Iterable[Precondition], facts: Facts) -> Precondition | None:
-    """Return the first that does not hold; what is not known does not."""
+    """Return the first precondition that does not hold; one that is unknown does not."""
     for each in preconditions:
         match each.kind:
             case PreconditionKind.BATTERY_ABOVE:
@@ -82,7 +82,7 @@ class Stopwatch:
         return now_s - self._begun_s + self._still_s
 
     async def wait(self, duration_s: float) -> None:
-        """Return when so much time has passed since the beginning; no robot time is spent here."""
+        """Return when this time has passed since the beginning; do not advance robot time."""
         # No event tells of time that passes at the robot.
         while self.read_s() < duration_s:  # noqa: ASYNC110
             await anyio.sleep(LOOK_S)

@@ -29,11 +29,11 @@ class GuardedSkill:
     """Holds a skill to its arguments, its preconditions, the policy and its time.
 
     Args:
-        skill: Does it; nobody else may have it.
-        facts: Tell what is so now.
-        guard: Decides and notes; None in tests.
-        is_through_guard: All that the skill sends to the robot passes the guard by itself, so that
-            the skill needs leave of its own only where a person's word is wanted.
+        skill: The skill; no other object may call it.
+        facts: The present facts.
+        guard: Decides and logs; None in tests.
+        is_through_guard: Each command of the skill to the robot passes the guard by itself, so that
+            the skill needs a permit of its own only where a person must approve it.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class GuardedSkill:
 
     @property
     def spec(self) -> SkillSpec:
-        """What is known of it."""
+        """Its description."""
         return self._skill.spec
 
     async def run(
@@ -80,7 +80,7 @@ class GuardedSkill:
         )
 
     def _clear(self, given: Mapping[str, JsonValue]) -> Permit | None:
-        """Return the guard's leave; None for what only reads, or asks for leave itself."""
+        """Return the guard's permit; None for a skill that only reads, or asks by itself."""
         needs_word = self.spec.approval is SkillApproval.ALWAYS
         is_free = self.spec.effect is SkillEffect.READS or self._is_through_guard
         if self._guard is None or (is_free and not needs_word):
@@ -90,7 +90,7 @@ class GuardedSkill:
 
 
 async def end_within(facts: Facts, limit_s: float, work: Callable[[], Awaitable[T]]) -> T | None:
-    """Return what comes of some work; None where it was cancelled for not ending in time.
+    """Return the result of some work; None where it was cancelled at the time limit.
 
     Raises:
         MapspeakError: As the work does.

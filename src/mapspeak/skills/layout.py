@@ -74,7 +74,7 @@ class MessageLayout:
         return tuple(slot.parameter for slot in self.slots)
 
     def build(self, arguments: Mapping[str, JsonValue]) -> dict[str, Any]:
-        """Return the message that some arguments say; what they leave out stays out."""
+        """Return the message with some arguments; missing ones stay out."""
         message: dict[str, Any] = {}
         for slot in self.slots:
             if slot.parameter.name in arguments:
@@ -257,7 +257,7 @@ class _Builder:
         return UNITS.get(message.name, {}).get(field.name, inherited)
 
     def _remark(self, message: MessageType, field: Field) -> str:
-        """Return what the definition says beside a field; else the constants, of an only number."""
+        """Return the definition's comment on a field; else the constants, of an only number."""
         if message.name not in self._remarks:
             lines = self._book.texts.get(message.name, "").splitlines()
             found = filter(None, map(REMARK.match, lines))

@@ -22,7 +22,7 @@ from mapspeak.skill import (
 MOST_KEPT = 200
 MOST_AT_ONCE = 20
 BEGINS_S = 2.0
-"""Wall time in which a run that cannot be begun says so; nobody is told before that it goes on."""
+"""Wall time in which a run that cannot begin fails; before it no run is reported as going on."""
 LOOK_S = 0.05
 """Wall time between two looks for a stop."""
 
@@ -35,11 +35,11 @@ class SkillRun:
     """One run of a skill, as far as it has come; kept after its end.
 
     Attributes:
-        handle: What a model calls it, such as "S1".
-        client: Whose it is; it ends when that client is gone.
+        handle: Its name for the model, such as "S1".
+        client: Its owner; it ends when that client is gone.
         begun_s: By the event loop's clock, as are all times here.
         ended_s: None while it goes on.
-        progress: The latest; None as long as nothing was told.
+        progress: The latest; None before the first.
         outcome: None while it goes on, and where it could not be begun.
         error: Why it could not be begun.
     """
@@ -66,7 +66,7 @@ class SkillRun:
 
     @property
     def state(self) -> SkillState:
-        """How it stands."""
+        """Its state."""
         if self.outcome is not None:
             return self.outcome.state
         return SkillState.RUNNING if self.error is None else SkillState.FAILED
@@ -83,7 +83,7 @@ class SkillRun:
         return until_s - self.begun_s
 
     async def do(self, arguments: Mapping[str, JsonValue]) -> None:
-        """Run the skill, and keep what comes of it, whatever that is."""
+        """Run the skill, and keep its outcome or error."""
         try:
             with self._scope:
                 self.outcome = await self.skill.run(arguments, self._take_progress)
@@ -100,7 +100,7 @@ class SkillRun:
             self._tell()
 
     async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
-        """Return at its end, when it asks something, or after so long; tell of news meanwhile.
+        """Return at its end, at a question, or when the time is over; report progress meanwhile.
 
         Args:
             wait_s: Wall time.
@@ -137,7 +137,8 @@ class SkillRuns:
     """All runs of one server, the latest last; they go on while `keep_going` runs.
 
     Args:
-        count_stops: Changes when somebody stops the robot: that ends what does not only read.
+        count_stops: Changes at each stop of the robot, which ends all runs but those that only
+            read.
     """
 
     def __init__(self, count_stops: Callable[[], int] = lambda: 0) -> None:
@@ -179,12 +180,12 @@ class SkillRuns:
         wait_s: float,
         on_news: OnNews | None = None,
     ) -> SkillRun:
-        """Run a skill, and return when it has ended, or after so long, when it goes on.
+        """Run a skill, and return when it has ended, or when the time is over while it goes on.
 
-        Whoever is cancelled while waiting gives up the run.
+        Cancelling this call gives up the run.
 
         Raises:
-            MapspeakError: It could not be begun.
+            MapspeakError: It could not begin.
         """
         if self._tasks is None:
             raise LinkError("No skill can be run: the server is ending.", hint="Start it again.")

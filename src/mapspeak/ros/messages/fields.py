@@ -123,13 +123,13 @@ def _field(message: object, name: str) -> Any:  # noqa: ANN401 - ROS JSON enters
 
 NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
 TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
-"""What names of ROS, and those of its types, look like."""
+"""Patterns of names of ROS, and of its types."""
 NANOSECONDS = 1_000_000_000
 LARGEST_SECONDS = 2**32 - 1
 
 
 class Dialect(StrEnum):
-    """Which ROS the other end speaks."""
+    """The version of ROS at the other end."""
 
     ROS1 = "ros1"
     ROS2 = "ros2"

@@ -1,4 +1,4 @@
-"""Markers: what RViz and Foxglove draw over a map, as messages of visualization_msgs."""
+"""Markers that RViz and Foxglove draw over a map, as messages of visualization_msgs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from mapspeak.ros.messages.poses import write_pose
 MARKER_ARRAY = "visualization_msgs/MarkerArray"
 ADD, DELETE_ALL = 0, 3
 LATEST_S = 0.0
-"""A stamp that RViz takes for "whenever": what lies on a map stays where it is."""
+"""A stamp that RViz takes for "any time": things on a map stay where they are."""
 ORIGIN = Pose(0.0, 0.0)
 
 
 class MarkShape(IntEnum):
-    """How something is drawn, as visualization_msgs/Marker numbers it."""
+    """Shapes, as visualization_msgs/Marker numbers them."""
 
     ARROW = 0
     CYLINDER = 3
@@ -33,7 +33,7 @@ SCALES = {
     MarkShape.POINTS: (1.0, 1.0, 0.0),
     MarkShape.TEXT: (0.0, 0.0, 1.0),
 }
-"""What the three numbers of a scale are, as multiples of the size."""
+"""The three numbers of a scale, as multiples of the size."""
 HEIGHT_M = 0.05
 """Above the floor, so that the map does not hide it; texts are over the rest."""
 TEXT_HEIGHT_M = 0.3
@@ -44,7 +44,7 @@ class Marker:
     """One thing to draw in the map frame.
 
     Attributes:
-        group: What can be shown and hidden together, such as "rooms".
+        group: The name of marks shown and hidden together, such as "rooms".
         size_m: How wide a line, a point or a disc is; how high a text; how long an arrow.
         colour: Red, green, blue and opacity, each from 0 to 1.
         points: Of a line, or single ones.

@@ -126,7 +126,7 @@ def _decode_wide(data: bytes) -> NDArray[np.float64]:
 
 
 PREFIX = struct.Struct("<iff")
-"""What compressedDepth puts before the PNG: a kind, and two terms of the quantisation."""
+"""The header of compressedDepth before the PNG: a kind, and two terms of the quantisation."""
 MILLIMETRE_M = 0.001
 
 Depth = NDArray[np.float64]

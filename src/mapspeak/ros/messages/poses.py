@@ -33,13 +33,13 @@ class FramedPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameTransform:
-    """Where one frame lies in another.
+    """The pose of one frame in another.
 
     Attributes:
         parent_from_child: The pose of the child frame in the parent frame, seen from above.
         height_m: How far above the parent's origin the child's is.
-        rotation: The whole rotation as a unit quaternion x, y, z, w; None where there is no more to
-            it than the heading of the pose.
+        rotation: The whole rotation as a unit quaternion x, y, z, w; None for a rotation about z
+            only, which the pose has.
     """
 
     parent_from_child: Pose

@@ -1,4 +1,4 @@
-"""Laser scans of ROS messages, and what cameras say of their lenses."""
+"""Laser scans of ROS messages, and the field of view of cameras."""
 
 import math
 import sys
@@ -30,7 +30,7 @@ SAYING_NOTHING: dict[str, Any] = {
     "range_min": 0.0,
     "range_max": sys.float_info.max,
 }
-"""What a scan's field holds instead of something that it cannot be."""
+"""The values that replace impossible ones in a scan's fields."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -72,8 +72,8 @@ def read_scan(message: Message) -> LaserScan:
     """Read sensor_msgs/LaserScan; ranges outside its own limits become NaN.
 
     A beam that met nothing is infinite (REP 117), or at its limit or beyond, as Stage and some
-    drivers of ROS 1 write it, and as AMCL reads it. Zero, NaN and what is too
-    near say nothing: drivers write them for dark things, glass, and the robot's own posts.
+    drivers of ROS 1 write it, and as AMCL reads it. Zero, NaN and ranges that are too near say
+    nothing: drivers write them for dark things, glass, and the robot's own posts.
     """
     frame_id, stamp_s = read_header(message)
     ranges_m = floats_of(message, "ranges")
@@ -95,10 +95,10 @@ def read_scan(message: Message) -> LaserScan:
 
 
 def mend_scan(message: Message) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return a sensor_msgs/LaserScan that can be read, and what was wrong with each of its fields.
+    """Return a readable sensor_msgs/LaserScan, and the faults of its fields.
 
-    A field that is wrong holds what says nothing instead: zero for an angle, no limit for a range,
-    NaN for a single beam.
+    A wrong field gets a neutral value instead: zero for an angle, no limit for a range, NaN for a
+    single beam.
     """
     mended, faults = dict(message), dict[str, str]()
     for name, nothing in SAYING_NOTHING.items():

@@ -1,4 +1,4 @@
-"""A robot made of a ROS system: what it offers, its map, its goals, over any connection."""
+"""A robot made of a ROS system: its interfaces, its map, its goals, over any connection."""
 
 from mapspeak.ros.robot.robot import NOTHING_SAID, RosRobot, build_ros_robot
 

@@ -1,6 +1,6 @@
-"""Goals for the robot's own navigation, Nav2 or move_base, and what is known of each drive.
+"""Goals for the robot's own navigation, Nav2 or move_base, and the state of each drive.
 
-A robot that takes a pose on a topic says nothing of it: its own pose has to tell.
+A robot that takes a pose on a topic does not report on it: its own pose has to tell.
 """
 
 import math
@@ -99,7 +99,7 @@ class ActionDriver:
 
     Args:
         map_frame: In which goals are given.
-        on_lost: Called when navigation has gone under a drive; nobody stops the base then.
+        on_lost: Called when navigation has gone during a drive; the base is then not stopped.
     """
 
     def __init__(
@@ -185,10 +185,10 @@ class ActionDriver:
                 self._on_lost()
 
     def _may_be_replaced_yet(self, record: GoalRecord, sent: ActionGoal) -> bool:
-        """Return True while the list of all goals, which may name a newer one of others, is behind.
+        """Return True while the list of all goals is late: it may name another client's newer goal.
 
-        Of a goal that was aborted, the list that says so shows what replaced it; the result comes
-        another way, and may come first.
+        The list that shows an aborted goal also shows the goal that replaced it; the result comes
+        over another topic or service, and may come first.
         """
         if record.is_replaced or sent.state is not ActionState.ABORTED:
             return False
@@ -198,7 +198,7 @@ class ActionDriver:
         return is_behind and ended_s < self._patience.result_s
 
     def _judge_end(self, record: GoalRecord, sent: ActionGoal) -> tuple[GoalState, Cause | None]:
-        """Return how a drive ended by what its action's goal and those of others say."""
+        """Return how a drive ended, from the states of its action goal and of others' goals."""
         navigation = self._navigation
         state, code = STATE_OF[sent.state], CauseCode.NAVIGATION_SAID
         if state is GoalState.ARRIVED:
@@ -246,7 +246,7 @@ MOVE_BASE = Navigation(
 
 
 LARGEST = 1e9
-"""No distance and no count is larger; what is, is no number of Nav2's."""
+"""No distance and no count is larger; a larger number is not from Nav2."""
 
 
 def _write_nav2_goal(pose: FramedPose) -> Message:
@@ -277,11 +277,11 @@ ARRIVAL_M = 0.35
 """Nav2 and move_base stop within 0.25 m by default, and the pose may be a step behind."""
 STANDING_M = 0.05
 GIVEN_UP_S = 20.0
-"""A robot that has stood still for so long has come as far as it could."""
+"""A robot that has stood still for this time has come as far as it could."""
 
 
 class GoalTopicDriver:
-    """Publishes goals and judges by the robot's pose what becomes of them.
+    """Publishes goals and judges their outcome by the robot's pose.
 
     Args:
         map_frame: In which goals are given.
@@ -305,7 +305,7 @@ class GoalTopicDriver:
         self._now_s = now_s
         self._current: GoalRecord | None = None
         self._moved: tuple[Point, float] | None = None
-        """Where the robot was when it last moved, and when."""
+        """The last pose in motion, and its time."""
         connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
         connection.started.actions[topic] = self
 
@@ -316,15 +316,15 @@ class GoalTopicDriver:
 
     @property
     def owners(self) -> frozenset[str]:
-        """None: whoever drives sees to the end."""
+        """None: the caller ends the drive."""
         return frozenset()
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Return nothing: a topic for goals does not tell what became of them."""
+        """Return nothing: a topic for goals does not tell their end."""
         return ()
 
     async def send(self, goal: Pose) -> GoalRecord:
-        """Publish a goal; nobody confirms it."""
+        """Publish a goal, without confirmation."""
         record = GoalRecord(goal)
         self._connection.started.n_begun += 1
         await self._publish(goal)

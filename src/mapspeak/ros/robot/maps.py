@@ -1,4 +1,4 @@
-"""The robot's map: the whole of it once, and what changes."""
+"""The robot's map: the whole of it once, then its updates."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -26,7 +26,7 @@ ROSBRIDGE_WAITS_S = (2.0, 3.0, 10.0)
 
 
 class MapSubscriber:
-    """Keeps the latest map, and makes a value of it when somebody wants it."""
+    """Keeps the latest map message, and makes a value of it on request."""
 
     def __init__(self, connection: RosConnection, profile: RobotProfile) -> None:
         self._connection = connection
@@ -46,8 +46,8 @@ class MapSubscriber:
         """Return the latest map; the same value until it changes.
 
         Raises:
-            LinkError: There is none, or it is none.
-            MapError: What came is no map.
+            LinkError: None has come, or the message is invalid.
+            MapError: The message does not hold a map.
         """
         maps = self._subscribe()
         await self._wait_for_first(maps)
@@ -134,6 +134,6 @@ class MapSubscriber:
     def _take_update(self, message: Message) -> None:
         if self._maps is None or self._maps.latest is None:
             return
-        # What does not fit the map is left out; the next whole map mends that.
+        # An update that does not fit the map is left out; the next whole map mends that.
         with suppress(MapspeakError):
             self._grid = apply_grid_update(self._read_latest(self._maps), message)

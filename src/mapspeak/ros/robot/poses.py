@@ -1,4 +1,4 @@
-"""Where the robot believes it is, and what time it is for the robot."""
+"""The robot's pose estimate and its clock."""
 
 from dataclasses import replace
 
@@ -18,11 +18,11 @@ from mapspeak.ros.port import RosConnection
 from mapspeak.ros.transforms import FrameListener
 
 FIRST_TICK_S = 1.0
-"""A clock topic that stays silent for so long is left over from something else."""
+"""A clock topic that stays silent for this time is left over from something else."""
 ASK_AGAIN_S = 1.0
-"""Whoever could tell the time may be found only after we have connected."""
+"""The node that tells the time may be found only after we have connected."""
 STILL_S = 2.0
-"""Of the wall clock; a simulated clock that has not moved on for so long may stand."""
+"""Wall time after which a simulated clock that has not moved on counts as still."""
 EPSILON_S = 1e-6
 
 
@@ -46,7 +46,7 @@ class RobotClock:
 
     @property
     def is_set(self) -> bool:
-        """True when the robot has said what time it is."""
+        """True when the robot has told its time."""
         return self._simulated_s is not None or self._offset_s is not None
 
     @property
@@ -55,7 +55,7 @@ class RobotClock:
         return self._simulated_s is not None and anyio.current_time() - self._ticked_s > STILL_S
 
     async def start(self, clock_topic: str | None) -> None:
-        """Set the clock by what the robot says now."""
+        """Set the clock by the robot's present time."""
         await self._ask_the_time()
         if clock_topic is not None:
             self._connection.subscribe(clock_topic).listen(self._take)
@@ -63,7 +63,7 @@ class RobotClock:
                 await self._moved_on.wait()
 
     async def set_late(self) -> None:
-        """Ask until the robot has said what time it is; for the background."""
+        """Ask until the robot has told its time; for the background."""
         while not self.is_set:
             await anyio.sleep(ASK_AGAIN_S)
             await self._ask_the_time()

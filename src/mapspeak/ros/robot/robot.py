@@ -67,12 +67,12 @@ class RosRobot:
 
     @property
     def profile(self) -> RobotProfile:
-        """What the robot offers, as far as it has been found."""
+        """The robot's interfaces, as far as they have been found."""
         return self._watch.profile
 
     @property
     def description(self) -> RobotDescription:
-        """What is fixed about this robot."""
+        """The fixed properties of this robot."""
         return RobotDescription(
             name=self.profile.name,
             radius_m=self.profile.radius_m,
@@ -144,7 +144,7 @@ class RosRobot:
         """Start a drive; return when navigation has taken or refused it."""
         await self.connection.wait_until_connected()
         await self._watch.find(RobotPart.NAVIGATION)
-        # Whoever drives may have to stop before long.
+        # A drive may need a stop before long.
         self.connection.advertise_early()
         self._n_sending += 1
         try:
@@ -157,7 +157,7 @@ class RosRobot:
         return record.goal_id
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
-        """Return how a drive stands, also long after its end and after a reconnection."""
+        """Return the state of a drive, also long after its end and after a reconnection."""
         record = self._record(robot_goal_id)
         if not record.is_over:
             await self.connection.wait_until_connected()
@@ -180,7 +180,7 @@ class RosRobot:
         """End all that we have started, and every drive of others; commands zero velocity.
 
         Raises:
-            LinkError: Names what could not be told, or goes on.
+            LinkError: Names the parts that could not be told to stop, or go on.
         """
         if not self.connection.is_open:
             await self.connection.wait_until_connected()
@@ -206,7 +206,7 @@ class RosRobot:
         return is_under_way or self._n_sending > 0
 
     def _take_change(self, before: RobotProfile) -> None:
-        """Use what has been found since; what has stayed the same goes on being used."""
+        """Use the newly found parts; keep those that have stayed the same."""
         now = self.profile
 
         def is_new(part: RobotPart) -> bool:
@@ -245,7 +245,7 @@ class RosRobot:
                     NAV2 if profile.navigation is NavigationKind.NAV2 else MOVE_BASE,
                     map_frame=profile.map_frame,
                     now_s=lambda: self.now_s,
-                    # Some bases keep to the last velocity when whoever drove them has gone.
+                    # Some bases keep the last velocity when their driver has gone.
                     on_lost=lambda: self._brake.pull(),  # noqa: PLW0108 - of then
                 )
             case NavigationKind.GOAL_TOPIC:
@@ -282,8 +282,8 @@ class RosRobot:
 async def build_ros_robot(
     connection: RosConnection, *, overrides: RobotOverrides = NOTHING_SAID
 ) -> RosRobot:
-    """Return the robot at the other end of a connection, once it has said what it offers."""
-    # Whether it is to be driven or only watched, whoever uses it says.
+    """Return the robot at the other end of a connection, once its interfaces are found."""
+    # The caller decides later whether to drive the robot or only watch it.
     connection.advertise_late()
     frames = FrameListener(connection)
     clock = RobotClock(connection)

@@ -1,6 +1,6 @@
-"""The camera and the laser, whose topics are subscribed to only while somebody looks.
+"""The camera and the laser, whose topics are subscribed to only while they are used.
 
-Where on the robot the laser is mounted is worked in.
+Scans are transformed by the mounting pose of the laser.
 """
 
 import math
@@ -24,18 +24,18 @@ from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from mapspeak.ros.transforms import FrameListener, TransformTree
 
 LINGER_S = 10.0
-"""After the last look; one who looks around asks again before that."""
+"""Time from the last look to unsubscribing; a client that looks around asks again before that."""
 THROTTLE_MS = 100
 
 
 class IdleSubscriptions:
-    """Subscribes when somebody looks, and unsubscribes when nobody has for a while.
+    """Subscribes at the first look, and unsubscribes after a while without one.
 
     Args:
-        subscribe: Begins what is needed for a look; it may raise.
+        subscribe: Begins the subscriptions needed for a look; it may raise.
 
     Attributes:
-        subscriptions: What it gave; empty while nobody looks.
+        subscriptions: Those that it began; empty while idle.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class IdleSubscriptions:
 
     @contextmanager
     def look(self) -> Generator[tuple[Subscription, ...]]:
-        """Keep the subscriptions while somebody looks, and return them."""
+        """Keep the subscriptions during a look, and return them."""
         self._n_looking += 1
         try:
             if not self.subscriptions:

@@ -19,20 +19,20 @@ from mapspeak.ros.robot.driving import LATEST_S
 PAUSE_S = 0.05
 N_AT_LEAST = 2
 STANDING_S = 0.5
-"""So long the pose must not have changed, by its own stamps."""
+"""Time without a change of pose, by its own stamps, after which the robot stands."""
 STANDING_M = 0.02
 STANDING_RAD = 0.03
 BLIND_S = 3.0
-"""So long zero velocity is repeated where no pose tells whether the robot stands."""
+"""How long zero velocity is repeated where no pose tells whether the robot stands."""
 LONGEST_S = 15.0
 STAND = Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
 
 
 class Brake:
-    """Publishes zero velocity; says beforehand that it will, so that the robot listens in time.
+    """Publishes zero velocity; advertises it beforehand, so that the robot subscribes in time.
 
     Args:
-        latest_pose: Tells where the robot was last; raises `LinkError` where nobody knows.
+        latest_pose: Returns the robot's latest pose; raises `LinkError` where it is unknown.
     """
 
     def __init__(
@@ -51,11 +51,11 @@ class Brake:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Where zero velocity is published: the robot's topic, and those that we have used."""
+        """The topics for zero velocity: the robot's own, and those that we have published on."""
         return tuple(self._zeros())
 
     def pull(self) -> None:
-        """Command a stand at once, and go on until the robot stands or something new is begun."""
+        """Publish zero velocity at once, then until the robot stands or a new motion begins."""
         self._publish()
         self._connection.start_soon(partial(self._repeat, self._connection.started.n_begun))
 
@@ -97,7 +97,7 @@ class _Standing:
     """Whether poses say that the robot stands.
 
     Attributes:
-        is_so: The pose has not changed for long enough.
+        is_so: True when the pose has not changed for long enough.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Which part of the map is looked at, which way up, and what of it is shown."""
+"""The way to look at a map: its part, its direction up, and its layers."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -33,14 +33,14 @@ MOST_REFUSED = 5
 MOST_CLOSED = 20
 SLACK = 1.25
 AROUND_M = 5.0
-"""So much is shown around a place that has no size of its own."""
+"""Size of the view around a place that has no size of its own."""
 RIM_M = 1.0
 MOST_SAMPLES = 200
-"""What lies in a turned square is found by so many points along its side."""
+"""Points along the side of a turned square with which its content is found."""
 
 
 class Layer(StrEnum):
-    """What can be shown of a map, in picture and text alike."""
+    """The layers of a map, in picture and text alike."""
 
     ROOMS = "rooms"
     DOORS = "doors"
@@ -48,14 +48,14 @@ class Layer(StrEnum):
     PLACES = "places"
     PATH = "path"
     UNSEEN = "unseen"
-    """The walls that no picture shows; only for who asks for them."""
+    """The walls that no picture shows; only on request."""
 
 
 USUAL_LAYERS = frozenset(Layer) - {Layer.UNSEEN}
 
 
 class Up(StrEnum):
-    """What points up in the picture."""
+    """The direction that points up in the picture."""
 
     NORTH = "north"
     ROBOT = "robot"
@@ -66,10 +66,10 @@ class MapLook:
     """A way to look at a world model.
 
     Attributes:
-        layers: What is drawn and listed.
+        layers: The layers to draw and list.
         up_rad: The direction in the map that points up in the picture.
         zoom: The square that is shown; None for all that is known.
-        around: What is in its middle; None without a zoom.
+        around: The place in its middle; None without a zoom.
     """
 
     layers: frozenset[Layer] = USUAL_LAYERS
@@ -105,7 +105,7 @@ class MapPart(Generic[Item]):
     Attributes:
         items: In the order in which they are listed.
         n_all: How many would be shown if there were room for all.
-        gap_after: After so many of them those that are left out belong; None for at the end.
+        gap_after: The number of items before the omitted ones; None for at the end.
     """
 
     items: tuple[Item, ...]
@@ -143,7 +143,7 @@ class UnseenWalls:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapView:
-    """What is to be seen of a world model: picture and text show the same.
+    """The shown part of a world model: picture and text show the same.
 
     Attributes:
         world: All there is.
@@ -155,7 +155,7 @@ class MapView:
         refused: Borders with the unknown that are not offered, longest first.
         places: Remembered ones, nearest first.
         closed: Areas that are closed to the robot now, in the order of the policy.
-        unseen: Walls that no picture shows; None where nobody asked for them.
+        unseen: Walls that no picture shows; None where not asked for.
     """
 
     world: WorldModel
@@ -171,7 +171,7 @@ class MapView:
 
 
 def view_of(world: WorldModel, look: MapLook, pictures: Sequence[CameraView] = ()) -> MapView:
-    """Return what is to be seen of a world model.
+    """Return the shown part of a world model.
 
     Args:
         pictures: Where pictures of this map were taken.

@@ -1,4 +1,4 @@
-"""What leads to tools, in hints, errors and instructions: said only where they are offered."""
+"""Sentences that lead to tools, in hints, errors and instructions: only of offered tools."""
 
 import re
 from collections.abc import Collection, Generator
@@ -10,13 +10,13 @@ from mapspeak.errors import MapspeakError, NextStep
 
 SENTENCE = re.compile(r"(?<=[.!?]) ")
 
-# State of a call, not of the module. None where nobody has said what is offered: all is.
+# State of a call, not of the module. None: all tools are offered.
 _OFFERED: ContextVar[frozenset[str] | None] = ContextVar("offered", default=None)
 
 
 @contextmanager
 def offering(names: Collection[str]) -> Generator[None]:
-    """Say in the `with` block only what leads to these tools."""
+    """Use in the `with` block only sentences that lead to these tools."""
     token = _OFFERED.set(frozenset(names))
     try:
         yield
@@ -28,8 +28,8 @@ def lead(template: str, **details: object) -> str:
     """Fill in a template without the sentences that lead to tools which are not offered.
 
     Args:
-        template: Sentences; a field that is none of the details names a tool.
-        details: What else is filled in.
+        template: Sentences; a field that is not one of the details names a tool.
+        details: The other fields.
     """
     return " ".join(filter(None, (_fill(each, details) for each in SENTENCE.split(template))))
 

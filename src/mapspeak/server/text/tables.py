@@ -54,15 +54,15 @@ MEANINGS = (
 
 
 FRONTIERS_AGAIN = 3
-"""So many are told to who looks again, with the nearest and the one that shows most."""
+"""Frontiers told at a later look, with the nearest and the one that shows most."""
 
 
 def describe_world(view: MapView, told: Told | None = None) -> str:
     """Return the facts: first what answers most questions, then a table for each layer.
 
     Args:
-        view: What is to be seen.
-        told: What the reader knows: rows that are as they were told are not told again.
+        view: The view to describe.
+        told: What the reader knows: unchanged rows are not told again.
     """
     told = told or Told()
     tables = {
@@ -251,7 +251,7 @@ BENT_RAD = math.radians(45)
 
 
 def room_tables(view: MapView, told: Told) -> str:
-    """Return a table of rooms and one of corridors; to who looks again, one of both."""
+    """Return a table of rooms and one of corridors; at a later look, one of both."""
 
     def table(heading: str, *parts: MapPart[Region]) -> str:
         return tell_rows(
@@ -267,8 +267,8 @@ def room_tables(view: MapView, told: Told) -> str:
 def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     """Say which room is the smallest and which the largest, corridors left out.
 
-    Rooms that may be parts of others are not counted, and named apart. Of some of all rooms it is
-    said that these are meant.
+    Rooms that may be parts of others are not counted, and named apart. The words tell whether these
+    are some or all of the rooms.
     """
     rooms = _rooms_by_size(regions)
     is_of_all = len(rooms) == len(_rooms_by_size(world.rooms.regions))
@@ -287,7 +287,7 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
 
 
 def say_walk(region: Region, walk: CorridorWalk) -> str:
-    """Say which doors come as somebody walks a corridor, side by side in their order."""
+    """List the doors along a corridor, side by side in their order."""
     sides = []
     for side in (
         DoorSide.BEHIND,

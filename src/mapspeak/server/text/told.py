@@ -1,4 +1,4 @@
-"""What a client has read of the map: what is as it was told is not told again."""
+"""The rows of the map that a client has read: unchanged ones are not told again."""
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -11,7 +11,7 @@ Item = TypeVar("Item")
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?")
 SAME = 0.3
-"""Metres, or square metres: what has changed by no more is as it was told."""
+"""Metres, or square metres: a smaller change is not told."""
 SAME_RATIO = 0.05
 WAY = "path m"
 """The column of ways, which change with each drive: only whether there is one is news."""
@@ -20,12 +20,12 @@ PICTURE = "picture"
 
 
 class Told:
-    """Compares what there is to tell with what was told, and keeps it for the next time.
+    """Compares new rows with those told before, and keeps them for the next time.
 
-    Numbers are compared with those that were told, so that what creeps is told once it has moved.
+    Numbers are compared with the told ones, so that a slow drift is told once it is large.
 
     Args:
-        before: What was told, by what it is about; None for a client that has read nothing yet.
+        before: The told texts by subject; None for a client that has read nothing yet.
     """
 
     def __init__(self, before: Mapping[str, str] | None = None) -> None:
@@ -34,12 +34,12 @@ class Told:
         self._now: dict[str, str] = {}
 
     def is_new(self, subject: str, text: str, *, is_exact: bool = False) -> bool:
-        """Return True for what was not told, or not so.
+        """Return True for a subject that was not told, or told differently.
 
         Args:
             subject: An id, or words that end with one.
-            text: What there is to tell of it.
-            is_exact: Numbers that changed a little make it new too.
+            text: Its text.
+            is_exact: A small change of a number makes it new too.
         """
         known = self._before.get(subject)
         if known is not None and (known == text or (not is_exact and _is_alike(known, text))):
@@ -49,16 +49,16 @@ class Told:
         return True
 
     def find_gone(self, subjects: Collection[str]) -> list[str]:
-        """Return what was told of and is no more.
+        """Return the told subjects that no longer exist.
 
         Args:
-            subjects: All there is now, whether it was told or not.
+            subjects: All that exist now, told or not.
         """
         gone = set(map(_id_of, self._before)) - set(subjects)
         return sorted(gone, key=lambda each: (each[0], len(each), each))
 
     def keep(self, subjects: Collection[str]) -> Mapping[str, str]:
-        """Return what this client has read by now of what there is."""
+        """Return the texts of existing subjects that this client has read."""
         read = self._before | self._now
         return {each: text for each, text in read.items() if _id_of(each) in subjects}
 
@@ -87,7 +87,7 @@ def tell_rows(
     """Return a table of what the reader does not know; empty where that is nothing.
 
     Args:
-        told: What the reader knows, by the first cell of each row.
+        told: The rows that the reader knows, by their first cells.
         heading: What the table shows.
         columns: Their names, `WAY` among them.
         parts: What is listed.

@@ -26,7 +26,7 @@ class CallFeed:
     """Tells pages of calls while they are noted in a log, if there is one.
 
     Args:
-        log: Where every call is written as well.
+        log: The call log, which also gets every call.
     """
 
     def __init__(self, log: CallNoting | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What a person may do from the page, under the same guard and audit as every tool."""
+"""A person's commands from the page, under the same guard and audit as every tool."""
 
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Annotated, Any
@@ -25,7 +25,7 @@ Words = Annotated[str, Field(min_length=1, max_length=120)]
 
 
 class CommandBody(BaseModel):
-    """What comes with a command."""
+    """The arguments of a command."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -54,7 +54,7 @@ class WaitingId(CommandBody):
 
 
 class Closing(CommandBody):
-    """What is closed, by its id, and until when; open-ended when that is empty."""
+    """The id of a closed area, and the end of its closure; empty for an open end."""
 
     place: Words
     until: str = Field("", max_length=40)
@@ -80,7 +80,7 @@ class Forgetting(CommandBody):
 
 
 class PersonCommands:
-    """Carries out a person's commands for one robot; each returns what came of it.
+    """Carries out a person's commands for one robot; each returns its result.
 
     Args:
         feed: Of the robot.
@@ -108,7 +108,7 @@ class PersonCommands:
     def by_name(
         self,
     ) -> Mapping[str, tuple[type[CommandBody], Callable[[Any], Awaitable[str]]]]:
-        """Every command by its name: what comes with it, and what carries it out."""
+        """Every command by its name: its arguments, and its function."""
         return {
             "stop": (Nothing, self._stop),
             "hold": (Nothing, self._hold),
@@ -227,7 +227,7 @@ class PersonCommands:
         return self._told(said)
 
     def _told(self, said: str) -> str:
-        """Note a change of the memory in the audit log, and return what was said of it."""
+        """Note a change of the memory in the audit log, and return its text."""
         if self._session.guard is not None:
             self._note("memory", said)
         return said

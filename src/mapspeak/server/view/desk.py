@@ -1,7 +1,7 @@
-"""How a person asks running servers for their live page: by files in their control folder.
+"""Requests of a person to running servers for their live page: files in the control folder.
 
-The person's command makes the key and leaves only its digest, so that no file and no log holds
-what lets somebody command. Each server that sees the request answers with its page's address.
+The person's command makes the key and leaves only its digest, so that no file and no log holds a
+usable key. Each server that sees the request answers with its page's address.
 """
 
 import os
@@ -37,7 +37,7 @@ class ViewDesk:
     def answer(self, request: Path, keys: PageKeys, *, robots: str, url: str) -> None:
         """Take the key of a request, and tell where the page is."""
         self._taken.add(request.name)
-        # Anything may lie there: what is no request is left alone.
+        # Other files may lie there: they are left alone.
         with suppress(OSError, ValueError):
             key_digest, _, name = request.read_text("utf-8").partition("\n")
             keys.admit(key_digest.strip(), name)

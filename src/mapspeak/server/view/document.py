@@ -1,4 +1,4 @@
-"""What a page draws, as JSON documents: the grid, the robot, what was said; `overlay` has the rest.
+"""The content of a page as JSON documents: the grid, the robot, the calls; `overlay` has the rest.
 
 A live page hears each as it changes, a chat asks for them, and a replay holds them step by step.
 Points are metres in the map frame, angles degrees counter-clockwise from x.
@@ -91,8 +91,8 @@ class RobotView(ViewPart):
 
     Attributes:
         doubt: Why it may be elsewhere; empty for a fresh pose on the map.
-        held_by: Who holds it, and why; None where it is not held.
-        waiting: What waits for a person's word, by the id to give it with.
+        held_by: The holder and the reason; None where it is not held.
+        waiting: The commands that wait for approval, by their ids.
         camera_fov_deg: How wide its camera sees; None until a picture has told.
     """
 
@@ -110,7 +110,7 @@ class CallView(ViewPart):
     """A call of a tool and its answer; in a replay also what else was said.
 
     Attributes:
-        is_over: It has been answered.
+        is_over: True once it has been answered.
         pictures: Addresses of those that came with it, relative to the page or the robot.
         note: Who and when, where that is known.
     """

@@ -1,4 +1,4 @@
-"""What pages are told as it happens: one watch of a robot, however many look."""
+"""Live news for pages: one watch of a robot, shared by all pages."""
 
 import json
 import logging
@@ -22,7 +22,7 @@ from mapspeak.worldmodel.model import WorldModel
 POSE_S = 0.1
 IDLE_S = 1.0
 MAP_EVERY = 10
-"""After so many poses the map is looked at, and pages hear that the server is there."""
+"""Every so many looks at the pose, look at the map and send pages a sign of life."""
 MOST_UNREAD = 200
 """A page that reads no more than that is let go; it comes back when it can."""
 TRAIL_M = 0.25
@@ -127,14 +127,14 @@ class ViewFeed:
         return None
 
     def tell_word(self, said: str, *, page: str) -> None:
-        """Tell all pages what a person has done at one of them."""
+        """Tell all pages of a person's command at one of them."""
         self._tell(_event("word", {"said": said, "page": page}))
 
     def _tell_call(self, call: CallView) -> None:
         self._tell(_event("call", call.model_dump()))
 
     async def _look_at_map(self) -> None:
-        """Tell what has changed of the map, and of what the tools have found on it."""
+        """Tell changes of the map, and of things that the tools have found on it."""
         try:
             grid = await self.session.robot.fetch_map()
         except MapspeakError:

@@ -1,4 +1,4 @@
-"""Who may command from the page: who has read the server's own terminal."""
+"""Keys to command from the page: only the server's own terminal shows them."""
 
 import hashlib
 import secrets
@@ -46,11 +46,11 @@ class PageKeys:
         return key
 
     def admit(self, key_digest: str, name: str = "") -> None:
-        """Take a key that somebody made who can be trusted, by its digest."""
+        """Take a key from a trusted maker, by its digest."""
         self._names[key_digest] = clean_line(name).strip()[:MOST_NAME] or NOBODY
 
     def find_name(self, key: str) -> str | None:
-        """Return the name of the person who has a key; None for an unknown key."""
+        """Return the name of a key's owner; None for an unknown key."""
         return self._names.get(digest(key))
 
     def _renew(self) -> None:
@@ -60,5 +60,5 @@ class PageKeys:
 
 
 def digest(key: str) -> str:
-    """Return what is kept of a key; looking it up tells nothing of the key by its time."""
+    """Return the digest of a key; a lookup by it leaks nothing of the key by its timing."""
     return hashlib.sha256(key.encode()).hexdigest()

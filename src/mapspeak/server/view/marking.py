@@ -1,4 +1,4 @@
-"""What lies on a map, for RViz and Foxglove: the page's overlay as marks, published on ROS."""
+"""Things on a map for RViz and Foxglove: the page's overlay as marks, published on ROS."""
 
 import logging
 import math
@@ -41,7 +41,7 @@ logger = logging.getLogger(__name__)
 
 
 class MarkSource:
-    """Draws what lies on a robot's map; finds rooms and frontiers of every new map itself."""
+    """Draws the things on a robot's map; finds rooms and frontiers of every new map itself."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -49,7 +49,7 @@ class MarkSource:
         self._path: tuple[str, list[Spot]] = ("", [])
 
     async def fetch(self) -> tuple[Marker, ...]:
-        """Return what there is to draw now.
+        """Return the marks to draw now.
 
         Raises:
             MapspeakError: There is no map to draw on.
@@ -58,7 +58,7 @@ class MarkSource:
         return await self._session.compute(partial(self._draw, world))
 
     def _draw(self, world: WorldModel) -> tuple[Marker, ...]:
-        # Tools find these when they need them; who looks at RViz waits for no tool.
+        # Tools find these when they need them; RViz must not wait for a tool.
         if self._surveyed is not world.map:
             _ = world.rooms, world.frontiers
             self._surveyed = world.map
@@ -132,7 +132,7 @@ def _outlined(
 
 
 def _label(group: str, at: Spot, text: str, colour: Colour) -> Marker:
-    # What people and models wrote may hold signs that no wire of ROS carries.
+    # Texts of people and models may hold characters that ROS cannot carry.
     said = clean_line(text).encode(errors="replace").decode()[:LONGEST_LABEL]
     return Marker(
         group=f"{group} names",
@@ -185,7 +185,7 @@ class MarkerPublisher:
             MapspeakError: There is no map, or they cannot be published.
         """
         marks = await self._source.fetch()
-        # A robot that was started anew knows nothing of what was latched before.
+        # A restarted robot has lost the latched messages from before.
         begun_s = anyio.current_time() - (self._connection.connected_for_s or 0.0)
         if begun_s < self._begun_s + SAME_S and marks == self._published:
             return

@@ -1,4 +1,4 @@
-"""What lies on the map, as JSON: rooms, doors, frontiers, closed areas, what is remembered.
+"""The things on the map as JSON: rooms, doors, frontiers, closed areas, the memory.
 
 Points are metres in the map frame, angles degrees counter-clockwise from x.
 """
@@ -37,7 +37,7 @@ class DoorView(ViewPart):
 
 
 class FrontierView(ViewPart):
-    """Where the known meets the unknown."""
+    """A border between known and unknown floor."""
 
     id: str
     at: Spot

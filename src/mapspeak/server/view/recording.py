@@ -46,7 +46,7 @@ ROS2 = Dialect.ROS2
 
 
 class Recorder(ServerListener):
-    """Writes messages of ROS 2 to one place; live, the latest of what is latched again."""
+    """Writes messages of ROS 2 to one place; live, repeats the latest latched ones."""
 
     def __init__(self) -> None:
         self.context = foxglove.Context()
@@ -70,7 +70,7 @@ class Recorder(ServerListener):
             self._latched[topic] = data, at_ns
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Send what is latched again: a client that comes late has missed it."""
+        """Send the latched messages again: a late client has missed them."""
         del client
         if channel.topic in self._latched:
             data, at_ns = self._latched[channel.topic]
@@ -121,11 +121,11 @@ def serve_foxglove(host: str, port: int) -> Iterator[Recorder]:
 
 
 class SessionRecord:
-    """Records one session: what it sees again and again, its calls and its audit as they happen.
+    """Records one session: its repeated looks, and its calls and audit as they happen.
 
     Args:
         name: Of the robot, where there are several: its topics begin with it.
-        calls: Is told of them.
+        calls: Gets the calls.
     """
 
     def __init__(
@@ -210,7 +210,7 @@ class SessionRecord:
 
 async def _repeat(work: Callable[[], Awaitable[None]], period_s: float) -> None:
     while True:
-        # What the robot does not tell now it may tell later.
+        # The robot may answer later.
         with suppress(MapspeakError):
             await work()
         await anyio.sleep(period_s)

@@ -18,7 +18,7 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
 
 RADIUS_M = 0.2
-"""Of a robot that nobody has told of; rooms do not depend on it."""
+"""Radius of an unknown robot; rooms do not depend on it."""
 
 
 class StepView(ViewPart):
@@ -55,7 +55,7 @@ class Replay(ViewPart):
 
 
 def show_map(grid: OccupancyGrid, memory: SemanticMap | None = None) -> tuple[GridView, Overlay]:
-    """Return a finished map as it is drawn, with its rooms and what is remembered on it."""
+    """Return a finished map as it is drawn, with its rooms and its memory."""
     start = grid.bounds()[0]
     world = WorldModel(
         grid,
@@ -135,7 +135,7 @@ def _steps_of_calls(path: Path) -> Iterator[StepView]:
 def locate_pictures(names: Iterable[str], folder: Path) -> Iterator[str]:
     """Return addresses of pictures in a folder beside the page.
 
-    A name may come from anywhere: what leads out of the folder, or is not there, is left out.
+    Names are untrusted: one that leads out of the folder, or does not exist, is left out.
     """
     for name in names:
         path = folder / name

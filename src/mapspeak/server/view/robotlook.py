@@ -1,4 +1,4 @@
-"""How the robot stands now, as pages show it."""
+"""The present state of the robot, as pages show it."""
 
 import math
 

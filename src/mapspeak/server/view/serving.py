@@ -33,7 +33,7 @@ async def serve_view(
     Args:
         feeds: Of each robot, by its name.
         address: HOST:PORT on this machine.
-        keys: Who may command.
+        keys: The keys that may command.
         on_ready: Called with the page's address once it answers.
 
     Raises:

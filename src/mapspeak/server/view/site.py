@@ -23,7 +23,7 @@ from mapspeak.server.view.pages import find_leaflet_files, find_page_files, link
 from mapspeak.server.view.tiles import draw_tile
 
 ONLY = "robot"
-"""What the only robot is called in addresses."""
+"""The name of an only robot in addresses."""
 TYPES = {".js": "text/javascript", ".css": "text/css", ".png": "image/png"}
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
@@ -41,7 +41,7 @@ MOST_BYTES = 2_000
 CHECK = "check"
 STOPS = frozenset({"stop", "hold"})
 FREE = STOPS | {CHECK}
-"""Need no key: what makes a robot stand must never wait, and a check moves nothing."""
+"""Commands without a key: a stop must never wait, and a check moves nothing."""
 KEY, NAME_OF_PAGE = "x-mapspeak-key", "x-mapspeak-page"
 
 
@@ -88,7 +88,7 @@ class LiveSite:
         return JSONResponse(list(self._feeds))
 
     async def stream(self, request: Request) -> Response:
-        """Tell a page what happens, until it leaves."""
+        """Send a page the news, until it leaves."""
         feed = self._find(request)
 
         async def events() -> AsyncIterator[bytes]:
@@ -112,7 +112,7 @@ class LiveSite:
         return Response(png, media_type="image/png", headers=kept)
 
     async def show_camera(self, request: Request) -> Response:
-        """Answer with what the camera sees now."""
+        """Answer with the present camera picture."""
         feed = self._find(request)
         robot = feed.session.robot
         if not robot.description.has_camera:
@@ -143,7 +143,7 @@ class LiveSite:
         return JSONResponse({"key": key})
 
     async def command(self, request: Request) -> Response:
-        """Carry out a person's command, and return what came of it."""
+        """Carry out a person's command, and return its result."""
         feed, name = self._find(request), request.path_params["command"]
         person = self._keys.find_name(request.headers.get(KEY, ""))
         if name not in FREE and person is None:
@@ -152,7 +152,7 @@ class LiveSite:
         if name not in commands.by_name:
             raise HTTPException(HTTPStatus.NOT_FOUND)
         try:
-            # A stop has nothing to say, and is not refused for what it says.
+            # A stop takes no arguments, and is not refused for wrong ones.
             body = {} if name in STOPS else await _read_body(request)
             said = await commands.carry_out(name, body)
         except ValidationError as error:
@@ -189,7 +189,7 @@ class LiveSite:
 
 
 def _name_page(request: Request) -> str:
-    """Return what a page calls itself, so that it is not told of its own commands."""
+    """Return a page's own id, so that it is not told of its own commands."""
     return request.headers.get(NAME_OF_PAGE, "")[:40]
 
 

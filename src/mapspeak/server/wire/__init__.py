@@ -1,1 +1,1 @@
-"""What passes between clients and the server: who is let in, and what is noted of it."""
+"""The traffic between clients and the server: access, and the log of calls."""

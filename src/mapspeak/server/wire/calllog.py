@@ -1,6 +1,6 @@
 """The call log: every call and its answer as a JSON line, pictures beside it.
 
-The audit log holds commands; this one also holds what was only read, for replay and for scoring
+The audit log holds commands; this one also holds calls that only read, for replay and for scoring
 clients that keep no log of their own.
 """
 
@@ -20,11 +20,11 @@ SUFFIXES = {"image/jpeg": ".jpg"}
 
 @dataclass(slots=True)
 class CallNote:
-    """What is noted of one call while it goes on.
+    """The notes of one call while it goes on.
 
     Attributes:
         answer: The result; None where the tool refused.
-        error: What it refused with.
+        error: The error of its refusal.
     """
 
     answer: CallToolResult | None = None
@@ -32,7 +32,7 @@ class CallNote:
 
 
 class CallNoting(Protocol):
-    """Notes calls, wherever to."""
+    """Logs calls."""
 
     def noting(self, tool: str, arguments: dict[str, Any]) -> AbstractContextManager[CallNote]:
         """Note a call when it has come to its end, however that is."""

@@ -1,4 +1,4 @@
-"""The doors of an address: who is let in by Host and Origin, and where a server listens."""
+"""Access to an address: the allowed Host and Origin, and where a server listens."""
 
 import ipaddress
 import socket
@@ -48,7 +48,7 @@ class HostGuard:
 def find_security(host: str, port: int) -> TransportSecuritySettings:
     """Return which Host and Origin headers are let through at an address."""
     if not is_loopback(host):
-        # The token is what guards here; the names by which others reach this machine are unknown.
+        # The token guards here; the names by which others reach this machine are unknown.
         return TransportSecuritySettings(enable_dns_rebinding_protection=False)
     names = {host, "localhost", "127.0.0.1", "[::1]"}
     return TransportSecuritySettings(

@@ -26,20 +26,20 @@ from mapspeak.skills.missions.tree import FindSkill, MissionBounds, MissionPlan,
 
 MOST_TOLD = 160
 """Letters of the steps that a person is asked about; the tree has them all."""
-# State of a task, not of the module: what runs now is a part of a mission.
+# State of a task, not of the module: True while a part of a mission runs.
 _IS_WITHIN: ContextVar[bool] = ContextVar("is_within", default=False)
 
 
 class MissionDesk:
-    """What all missions of one server share.
+    """The context that all missions of one server share.
 
     Args:
         find_skill: Raises `SkillError` for an unknown name.
         list_skills: Names all of them.
-        facts: Tell what is so.
+        facts: The present facts.
         guard: Decides on each mission; None in tests.
         record: On disk.
-        present: Marks that somebody is there: a mission needs no client while it runs.
+        present: Marks a client as present: a mission needs no client while it runs.
 
     Attributes:
         running: The name of the mission under way; empty while there is none.
@@ -64,10 +64,10 @@ class MissionDesk:
         self.running = ""
 
     def check(self, plan: MissionPlan) -> MissionBounds:
-        """Return what a mission can do at most.
+        """Return the bounds of a mission.
 
         Raises:
-            SkillError: Something in it is not known, not allowed, or does not fit.
+            SkillError: A part of it is unknown, not allowed, or does not fit.
         """
         return check_plan(plan, self.find_skill, self.list_skills())
 
@@ -81,7 +81,7 @@ class MissionSkill:
 
     @property
     def spec(self) -> SkillSpec:
-        """What is known of it."""
+        """Its description."""
         return self.plan.spec
 
     async def run(
@@ -162,7 +162,7 @@ class MissionSkill:
         return await runner.run()
 
     def _errand(self, bounds: MissionBounds, given: Mapping[str, JsonValue]) -> Errand:
-        """Return what a person agrees to: this tree with these arguments, and no other one."""
+        """Return the subject of an approval: this tree with these arguments, and no other one."""
         leaves = [
             " ".join(filter(None, (step.skill, plain(step.main or ""))))
             for step in self.plan.tree.walk()

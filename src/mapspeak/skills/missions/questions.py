@@ -1,4 +1,4 @@
-"""Questions that missions ask, and who answers them: a model, a person, or nobody in time."""
+"""Questions that missions ask a model or a person, with a default when the time is over."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -83,8 +83,8 @@ class Question:
 
     Attributes:
         id: Such as "Q1".
-        picture: What it is about; None where the mission has taken none.
-        answer: None as long as nobody has given one.
+        picture: Its subject; None where the mission has taken none.
+        answer: None until one is given.
     """
 
     id: str
@@ -137,7 +137,7 @@ class QuestionBook:
         """Give an answer, and return it as the mission takes it.
 
         Raises:
-            SkillError: It is none of those that are taken.
+            SkillError: It is not one of the accepted answers.
         """
         taken = {each.casefold(): each for each in question.answers}
         said = answer.strip()
@@ -163,7 +163,7 @@ class AskSkill:
     async def run(
         self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
     ) -> SkillOutcome:
-        """Ask, and fall back on what its asker said where nobody answers in time."""
+        """Ask, and fall back on the default where no answer comes in time."""
         question = self._questions.put(
             arguments["question"], tuple(arguments.get("answers", ())), arguments.get("picture")
         )

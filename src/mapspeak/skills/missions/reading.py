@@ -29,7 +29,7 @@ FORM = "Write each step as `skill: argument`, or as one of " + ", ".join(sorted(
 
 
 def parse_tree(written: object) -> Any:  # noqa: ANN401 - whatever was written
-    """Return what a text says, as YAML or JSON; what was read from JSON before is as good.
+    """Return the value of a text in YAML or JSON; a value read from JSON before is taken too.
 
     Raises:
         SkillError: It is neither, or too long.
@@ -155,7 +155,7 @@ def _plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - YAML
     """Return a value of YAML without what its reader adds.
 
     Raises:
-        SkillError: It is nested too deep, as one is that holds itself.
+        SkillError: It is nested too deep, as a value that contains itself is.
     """
     if depth > DEEPEST:
         raise _fault(value, "an argument is nested too deep")

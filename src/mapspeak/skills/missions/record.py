@@ -1,4 +1,4 @@
-"""What missions did, on disk: one JSON line a step, so that a killed server leaves an account."""
+"""The steps of missions on disk: one JSON line a step, so that a killed server leaves a record."""
 
 import json
 import logging
@@ -24,7 +24,7 @@ class Interrupted:
 
     Attributes:
         begun: ISO 8601, by the operator's clock.
-        steps: What it had done.
+        steps: The steps it had done.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Interrupted:
 
 
 class MissionRecord:
-    """Writes one file, and finds in it what an earlier server has left off.
+    """Writes one file, and finds in it the missions that an earlier server left unfinished.
 
     Args:
         path: The file.
@@ -46,7 +46,7 @@ class MissionRecord:
         self._run = ""
 
     def begin(self, name: str) -> None:
-        """Note that a mission begins; what follows is of that one."""
+        """Note that a mission begins; the following steps are its own."""
         self._run = secrets.token_hex(4)
         self._write("begun", name)
 

@@ -34,14 +34,14 @@ class MissionRunner:
 
     Args:
         tree: Checked before.
-        values: What the mission is given, by name; outputs of its steps come to it.
+        values: The mission's arguments, by name; outputs of its steps are added.
         find_skill: Asked when a leaf begins: a skill may have gone meanwhile.
         facts: Tell the time.
         on_progress: Told of each step.
         on_step: Writes the record; it may not raise.
 
     Attributes:
-        account: What was done, a step each.
+        account: The steps done so far.
         ending: Steps that were cut off, and have not ended at the robot yet.
     """
 
@@ -55,7 +55,7 @@ class MissionRunner:
         on_progress: OnProgress,
         on_step: OnStep,
     ) -> None:
-        # What py_trees has to say it prints, and stdout belongs to the protocol.
+        # py_trees prints its messages, and stdout belongs to the protocol.
         py_trees.logging.level = py_trees.logging.Level.ERROR
         self.values: dict[str, JsonValue] = dict(values)
         self.facts = facts
@@ -72,7 +72,7 @@ class MissionRunner:
         self._root = self._build(tree)
 
     async def run(self) -> SkillOutcome:
-        """Run it to its end; whoever cancels this cancels what goes on of it, too."""
+        """Run it to its end; cancelling this call cancels its running steps, too."""
         async with anyio.create_task_group() as self._tasks:
             while self._cut_off is None:
                 self._news = anyio.Event()
@@ -94,7 +94,7 @@ class MissionRunner:
             quote="" if last is None else last.quote,
         )
 
-    # --- what leaves ask for ---
+    # --- calls by leaves ---
 
     def start(self, work: Callable[[], Coroutine[object, object, None]]) -> None:
         """Run the work of a step beside the others."""
@@ -106,7 +106,7 @@ class MissionRunner:
         self._news.set()
 
     async def do_leaf(self, step: Step) -> SkillOutcome:
-        """Run the skill of a leaf, once what was cut off before has ended."""
+        """Run the skill of a leaf, once steps that were cut off before have ended."""
         while self.ending:
             await self._news.wait()
         try:
@@ -258,7 +258,7 @@ class _Leaf(Behaviour):
         if new_status is Status.INVALID:
             self._task.cut_off()
         else:
-            # What is repeated begins anew at the next tick.
+            # A repeated step begins anew at the next tick.
             self._runner.wake()
 
 
@@ -288,7 +288,7 @@ class _Pace(Behaviour):
 
 
 class _TimeLimit(Decorator):
-    """Fails when what it holds has not ended in time, by the robot's clock."""
+    """Fails when its step has not ended in time, by the robot's clock."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""A mission as a tree of steps: what it can cost at most, and whether all in it is known."""
+"""A mission as a tree of steps: its largest cost, and a check that all its skills are known."""
 
 import difflib
 import re
@@ -20,7 +20,7 @@ TEMPLATE = re.compile(r"\{([a-z][a-z0-9_]*)(?:\.([A-Za-z0-9_]+))?\}")
 
 
 class StepKind(StrEnum):
-    """How the steps within a step are done; a leaf runs a skill."""
+    """How a step does the steps within it; a leaf runs a skill."""
 
     SEQUENCE = "sequence"
     FALLBACK = "fallback"
@@ -41,11 +41,11 @@ class Step:
         number: Its place in the tree, from 1, as it is read.
         steps: Those within it; of `UNTIL` the condition comes last.
         limit: Seconds of `TIMEOUT`, minutes of `EVERY`.
-        times: At most so often, of `RETRY`, `REPEAT`, `EVERY` and `UNTIL`.
+        times: The most repetitions of `RETRY`, `REPEAT`, `EVERY` and `UNTIL`.
         needs_all: Of `PARALLEL`: else one that succeeds is enough.
         skill: The name of the one that a leaf runs.
-        main: What a leaf gives to the first parameter of its skill; None where it names all.
-        arguments: What a leaf gives by name; texts may hold "{name}" and "{name.field}".
+        main: A leaf's argument for the first parameter of its skill; None where it names all.
+        arguments: A leaf's arguments by name; texts may hold "{name}" and "{name.field}".
         output: The name under which a leaf's result is passed on; empty for none.
     """
 
@@ -81,7 +81,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class MissionBounds:
-    """What a mission can do at most.
+    """The bounds of a mission.
 
     Attributes:
         asked: The skills in it for which a person is asked each time.
@@ -99,7 +99,7 @@ class MissionBounds:
         )
 
     def times(self, n: int) -> "MissionBounds":
-        """Return what it is when all of it is done so often."""
+        """Return the bounds of that many repetitions."""
         return MissionBounds(self.n_drives * n, self.n_commands * n, self.asked)
 
 
@@ -108,7 +108,7 @@ class MissionPlan:
     """A mission before it is run.
 
     Attributes:
-        remember: What people have said about it since it was saved.
+        remember: Remarks of people about it since it was saved.
     """
 
     spec: SkillSpec
@@ -126,11 +126,11 @@ def check_plan(
 
     Args:
         find_skill: Raises `SkillError` for a name that it does not know.
-        known: The names of all skills, for who has misspelled one.
+        known: The names of all skills, for a hint at a misspelled one.
         above: The missions that this one is within.
 
     Raises:
-        SkillError: Something in it is not known, not allowed, or does not fit.
+        SkillError: A part of it is unknown, not allowed, or does not fit.
     """
     name = plan.spec.name
     if name in above or len(above) >= MOST_NESTED:
@@ -155,7 +155,7 @@ class _Checker:
         self._above = above
 
     def check(self, step: Step, names: set[str]) -> MissionBounds:
-        """Check a step and what is within; take up the names of its outputs."""
+        """Check a step and the steps within; collect the names of its outputs."""
         if step.kind is StepKind.LEAF:
             return self._check_leaf(step, names)
         parts = [self.check(each, names) for each in step.steps]

@@ -1,1 +1,1 @@
-"""skills.yaml: what the owner of a robot says that it can do."""
+"""skills.yaml: the skills of a robot as its owner declares them."""

@@ -19,11 +19,11 @@ OpenSkill = Callable[[], Awaitable[Skill]]
 
 
 class OwnedSkill:
-    """Calls what its owner named.
+    """Calls the interface that its owner named.
 
     Args:
         entry: As it was written.
-        open_called: Finds at the robot what it calls.
+        open_called: Finds the called interface at the robot.
         find_skill: Finds the skill whose result is looked at.
     """
 
@@ -36,7 +36,7 @@ class OwnedSkill:
 
     @property
     def spec(self) -> SkillSpec:
-        """What is known of it."""
+        """Its description."""
         return self.entry.spec
 
     async def run(

@@ -1,4 +1,4 @@
-"""skills.yaml, the owner's words for what a robot can do; saved missions are such files too."""
+"""skills.yaml, in which the owner declares a robot's skills; saved missions are such files too."""
 
 import io
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ USUAL_TIMEOUT_S = 60.0
 
 
 class Called(StrEnum):
-    """What a skill calls."""
+    """The kinds of things that a skill calls."""
 
     SERVICE = "service"
     ACTION = "action"
@@ -52,14 +52,14 @@ class OwnersEntry:
     """One skill as its owner wrote it.
 
     Attributes:
-        calls: What kind of thing it calls.
+        calls: The kind of thing it calls.
         target: Its name at the robot; empty for a mission.
-        type: As the owner says, where the robot does not; else empty.
+        type: Given by the owner, where the robot does not tell it; else empty.
         fixed: Arguments of what it calls that are always the same.
-        renamed: Which argument of what it calls each of its own parameters is.
-        success: What has to hold of the result; None where the robot's word does.
+        renamed: The called interface's argument for each of its own parameters.
+        success: Conditions on the result; None where the robot's own report decides.
         judge: The skill whose result is looked at in place of its own; else empty.
-        remember: What people have said about it since.
+        remember: Remarks of people about it since.
         tree: Of a mission.
     """
 
@@ -269,7 +269,7 @@ def write_mission(path: Path, written: Mapping[str, Any]) -> None:
 
 
 def add_correction(path: Path, name: str, correction: str) -> None:
-    """Keep what a person said of a skill in its file, and leave the rest as it is written there.
+    """Keep a person's remark about a skill in its file, and leave the rest as it is written there.
 
     Raises:
         ConfigError: The file cannot be read or written.
