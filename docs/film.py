@@ -33,7 +33,7 @@ FRAME_MS, LAST_MS = 1100, 3000
 MOST_TRIPS = 20
 SURE_M = 6.0
 SAFETY = re.compile(r"\b(fire|exit|first aid|eye wash)\b")
-REPORTED = re.compile(r"- (.+), bearing ([+-]\d+) deg, range ([\d.]+) m")
+REPORTED = re.compile(r"- ([^,]+), ([+-][\d.]+) deg, ([\d.]+) m")
 
 
 @dataclass(slots=True, kw_only=True)

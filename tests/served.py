@@ -5,6 +5,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import anyio
 from mcp.client import Client
 from mcp.client.session import ElicitationFnT
 from mcp_types import CallToolResult, ImageContent, TextContent
@@ -47,8 +48,11 @@ async def connect(
         representation=representation,
         call_log=call_log,
     )
-    async with Client(server, mode=mode, elicitation_callback=on_question) as client:
-        yield client
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(server.keep_skills)
+        async with Client(server, mode=mode, elicitation_callback=on_question) as client:
+            yield client
+        tasks.cancel_scope.cancel()
 
 
 def text_of(result: CallToolResult) -> str:

@@ -174,6 +174,7 @@ async def test_a_simulated_robot_keeps_the_memory_that_it_is_given(
     ("toolsets", "has", "lacks"),
     [
         ("+explore", {"explore", "look_at_map", "stop_robot"}, set()),
+        ("+explore,routes", {"explore", "follow_route", "look_at_map"}, set()),
         ("explore", {"explore", "stop_robot"}, {"look_at_map", "navigate_to"}),
         ("look", {"look_at_map"}, {"stop_robot"}),
     ],

@@ -49,6 +49,8 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "relations.md"
         ("left of W3, facing D1", Turned("left of W3", "D1")),
         ("R2 looking back through D6", Turned("R2", "D6")),
         ("R2, looking back through its door", Turned("R2", None)),
+        ("go to R2, look back through its door", Turned("R2", None)),
+        ("stand between D1 and D2", Between((("D1", "D2"),), "D1 and D2")),
         ("R2 facing its doorway", Turned("R2", None)),
         (
             "the second-largest room",

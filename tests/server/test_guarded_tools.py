@@ -58,6 +58,7 @@ MOVING_CALLS: dict[str, list[dict[str, Any]]] = {
     "look_at": [{"place": "3.0, 1.0"}],
     "search_for": [{"thing": "extinguisher"}, {"thing": "extinguisher", "seen": False}],
     "follow_route": [{"stops": ["3.0, 1.0"]}],
+    "run_mission": [{"tree": "- drive: 3.0, 1.0"}],
 }
 """The calls that make a tool move the robot, where an empty one does not."""
 
@@ -116,7 +117,7 @@ async def test_a_moving_tool_moves_the_robot_and_its_drive_is_in_the_log(
     assert robot.goals, f"add the calls with which {tool} moves to MOVING_CALLS: {said}"
     decisions = [line for line in audit_of(tmp_path) if line.event == "decision"]
     assert {(line.tool, line.verdict) for line in decisions} == {(tool, "allowed")}
-    assert len(decisions) == len(robot.goals)
+    assert len([line for line in decisions if line.kind == CommandKind.DRIVE]) == len(robot.goals)
 
 
 @pytest.mark.parametrize("rule", RULES)

@@ -138,3 +138,19 @@ async def test_a_place_that_nobody_knows_is_an_error(tmp_path: Path) -> None:
         result = await client.call_tool("look_at", {"place": "R77"})
     assert result.is_error
     assert "There is no place called 'R77'" in text_of(result)
+
+
+async def test_a_thing_on_the_other_side_of_a_wall_is_not_in_view(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms(), pose=Pose(4.6, 2.2, math.pi))
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("look_through_camera", {})
+        noted = {
+            "name": "in R2",
+            "description": "its wall",
+            "functional_landmarks": [{"label": "fridge", "bearing_deg": 0, "range_m": 0.9}],
+        }
+        assert not (await client.call_tool("write_semantic_data", noted)).is_error
+        robot.pose = Pose(0.6, 2.2, 0.0)
+        told = text_of(await client.call_tool("look_at", {"place": "2.6, 2.2"}))
+    assert "The point is in view." in told
+    assert "T1" not in columns(told)

@@ -117,7 +117,8 @@ class ToolChoice:
     callback=split_names,
     default=None,
     help="Groups of tools, comma-separated (default: look,places,drive,paper); others are "
-    "explore, routes, memory, ros, skills and missions. +NAME adds one to the default.",
+    "explore, routes, memory, ros, skills and missions. A + before any name adds to the default: "
+    "+explore,routes.",
 )
 @click.option(
     "--tools", callback=split_names, default=None, help="Further single tools, comma-separated."
@@ -284,9 +285,9 @@ def _build_server(
     from mapspeak.skills.owners.skillsfile import load_skills  # noqa: PLC0415
 
     chosen = options.tools
-    added = tuple(name.removeprefix("+") for name in chosen.sets if name.startswith("+"))
-    others = tuple(name for name in chosen.sets if not name.startswith("+"))
-    toolsets = (*(others or DEFAULT_TOOLSETS), *added)
+    is_added = any(name.startswith("+") for name in chosen.sets)
+    named = tuple(name.removeprefix("+") for name in chosen.sets)
+    toolsets = (*DEFAULT_TOOLSETS, *named) if is_added or not named else named
     is_ros = "ros" if options.skills.expose else ""
     require_ros(session, toolsets=(*toolsets, is_ros), tools=chosen.single)
     return build_server(

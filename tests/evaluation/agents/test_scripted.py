@@ -31,7 +31,7 @@ PROMPT = "Fire detected nearby. Navigate to the tool used for it."
 def test_eyes_that_are_not_sharp_note_what_is_near(script: str, n_seen: int) -> None:
     work = SCRIPTS[script]
     sight_m = work.keywords["sight_m"] if isinstance(work, partial) else math.inf
-    told = "- desk, bearing +3 deg, range 1.2 m\n- fridge, bearing -3 deg, range 4.0 m"
+    told = "- desk, +3 deg, 1.2 m\n- fridge, -3 deg, 4.0 m"
     assert len(ToolDriver(ToolClient(None), sight_m=sight_m).note(told)) == n_seen
 
 

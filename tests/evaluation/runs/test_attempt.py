@@ -87,10 +87,10 @@ def test_a_question_is_answered_without_driving(tmp_path: Path) -> None:
 
 
 def test_every_call_and_picture_is_kept_for_replay(tmp_path: Path) -> None:
-    result = run_one(tmp_path, "smallest-room")
+    result = run_one(tmp_path, "view")
     turns = read_turns(tmp_path, result.trial)
     assert [turn.role for turn in turns[:2]] == ["system", "user"]
-    assert turns[1].text == "Go to the smallest room."
+    assert turns[1].text.startswith("Take a picture of")
     pictures = [name for turn in turns for name in turn.pictures]
     folder = trial_folder(tmp_path, result.trial) / "pictures"
     assert pictures

@@ -145,7 +145,7 @@ async def test_a_cancelled_mission_leaves_the_robot_standing(link: str, tmp_path
         assert "cancelled" in ended
         before = robot.simulation.truth.driven_m
         while robot.simulation.velocity.speed_mps:
-            await anyio.lowlevel.checkpoint()
+            await robot.driven.sleep(0.1)
         settled = robot.simulation.truth.driven_m
         assert settled - before < 1.0
         assert "0" in await robot.ask("wait_for_goal", wait_s=0.0)

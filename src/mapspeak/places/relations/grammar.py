@@ -154,6 +154,8 @@ Standing = Towards | Away | NextTo | Facing | Turned | Between | Corner | WallSi
 """What means where to stand."""
 Relation = Standing | Superlative | Several
 
+VERB = re.compile(r"\s*(?:go|drive|move|come|stand)\s+(?:to\s+)?(?=\S)", re.IGNORECASE)
+"""What a person says before a place; it changes nothing."""
 LONGEST = 300
 """Longer words are a text and no phrase."""
 THE = r"(?:the )?"
@@ -188,7 +190,7 @@ def parse_relation(words: str) -> Relation | None:
     """Return the relation that words express; None for other words."""
     if len(words) > LONGEST:
         return None
-    wanted = plain(words)
+    wanted = plain(VERB.sub("", words, count=1))
     for form, read in FORMS:
         match = form.fullmatch(wanted)
         relation = None if match is None else read(match)
@@ -270,7 +272,7 @@ ITS_DOOR = r"(?:its (?:own )?|the )(?:door|doorway)"
 FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
     (
         pattern(
-            rf"(?P<place>.+?),? (?:(?:facing|looking) back(?: {TOWARDS} {ITS_DOOR})?"
+            rf"(?P<place>.+?),? (?:(?:facing|look(?:ing)?) back(?: {TOWARDS} {ITS_DOOR})?"
             rf"|{LOOKING} its (?:own )?(?:door|doorway))"
         ),
         lambda m: Turned(m["place"].rstrip(","), None),

@@ -10,7 +10,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.places.goalcheck import check_goal
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal, find_place
-from mapspeak.places.standing import choose_crossing, spread_places
+from mapspeak.places.standing import choose_crossing, point_ahead, spread_places
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.spatial.viewing import (
     SIGHT_M,
@@ -118,7 +118,7 @@ def measure_shown(
 
 def find_sights(world: WorldModel, pose: Pose, half_view_rad: float) -> tuple[Sight, ...]:
     """Find the doors and the remembered things that a picture should show, from left to right."""
-    candidates = [*_list_candidates(world)]
+    candidates = [*_list_candidates(world, pose)]
     sights = [
         Sight(
             id=name,
@@ -132,12 +132,23 @@ def find_sights(world: WorldModel, pose: Pose, half_view_rad: float) -> tuple[Si
     return tuple(sorted(sights, key=lambda each: -each.bearing_rad))
 
 
-def _list_candidates(world: WorldModel) -> Iterator[tuple[str, str, Point, float]]:
+def _list_candidates(world: WorldModel, pose: Pose) -> Iterator[tuple[str, str, Point, float]]:
     for door in world.rooms.doors:
         yield door.id, "", door.place, OWN_DOOR_M
     for remembered in world.things:
-        if remembered.thing.position is not None:
-            yield remembered.id, remembered.thing.label, remembered.thing.position, OWN_THING_M
+        point = remembered.thing.position
+        if point is not None and _is_on_this_side(world, remembered, pose, point):
+            yield remembered.id, remembered.thing.label, point, OWN_THING_M
+
+
+def _is_on_this_side(
+    world: WorldModel, remembered: RememberedThing, pose: Pose, point: Point
+) -> bool:
+    """Return False for a thing at a wall whose other side it was seen from."""
+    before = world.rooms_before(remembered)
+    front = point_ahead(point, point.bearing_to(pose.point), OWN_THING_M)
+    room = world.find_room_id(front)
+    return room is None or not before or room in before
 
 
 def _shows(

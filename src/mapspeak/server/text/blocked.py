@@ -24,6 +24,7 @@ from mapspeak.server.text.wording import (
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_LINES = 12
+BORDERS = "borders with the unknown not offered"
 NOTHING = (
     "Nothing is known to be blocked: the robot gets to every room, door and remembered place, and "
     "no drive has failed."
@@ -52,11 +53,14 @@ def describe_blocked(
         "doors without a way": list(_say_doors(world)),
         "rooms without a way": list(_say_rooms(world)),
         "remembered places without a way": list(_say_places(world)),
-        "borders with the unknown not offered": list(_say_borders(world)),
+        BORDERS: list(_say_borders(world)),
         "goals that failed": [_say_drive(drive, now_s) for drive in failed],
     }
     known = {what: lines for what, lines in parts.items() if lines}
-    counted = ", ".join(f"{what} ({len(lines)})" for what, lines in known.items())
+    n_borders = len(find_refused(world))
+    counted = ", ".join(
+        f"{what} ({n_borders if what == BORDERS else len(lines)})" for what, lines in known.items()
+    )
     lines = [f"The robot is held, so it drives nowhere: {shorten(held_by)}."] if held_by else []
     lines += [f"In the way: {counted}." if known else NOTHING]
     return "\n\n".join(["\n".join(lines), *(_section(*part) for part in known.items())])

@@ -179,8 +179,11 @@ def _say_bound(progress: Progress) -> str:
         case BoundKind.DURATION:
             return f"{progress.bounds.duration_s:.0f} s have passed."
         case BoundKind.KNOWN:
-            known_percent = 100 * (progress.bounds.known_ratio or 0.0)
-            return f"{known_percent:.0f} % of the floor to be expected are known."
+            bound_percent = 100 * (progress.bounds.known_ratio or 0.0)
+            return (
+                f"{100 * progress.known_ratio:.0f} % of the expected floor is known; the bound was "
+                f"{bound_percent:.0f} %."
+            )
     goals = "goal was" if progress.n_goals == 1 else "goals were"
     return (
         f"{progress.n_goals} {goals} tried: {progress.n_arrived} reached, {progress.n_seen} seen "

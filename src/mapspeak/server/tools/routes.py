@@ -67,7 +67,7 @@ class RouteTools:
         "Follow a route",
         ToolEffect.MOVES,
         has_report=True,
-        leads="Use it instead of several {navigate_to}. It goes on also after {stop_robot}.",
+        leads="Use it instead of several {navigate_to}. A call after {stop_robot} resumes it.",
     )
     async def follow_route(
         self,
