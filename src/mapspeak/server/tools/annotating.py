@@ -1,4 +1,4 @@
-"""What `write_semantic_data` is given, sorted into what is remembered and what is refused."""
+"""The arguments of `write_semantic_data`, sorted into accepted and refused things."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -35,10 +35,10 @@ SAME_BEARING_RAD = math.radians(20.0)
 """A direction read off a picture and one that was measured differ by less 19 times in 20."""
 
 SAME_RANGE_M = 0.1
-"""Who tells a range to that has read off what was measured."""
+"""A told range this close to a measured one was read off it."""
 
 FARTHEST_SEEN_M = 100.0
-"""No camera on a robot tells what a thing is from farther away."""
+"""A robot's camera does not identify things from farther away."""
 
 FULL_TURN_DEG = 360.0
 READ_OFF = "picture"
@@ -74,11 +74,11 @@ class Landmarks(RootModel[list[Label | LandmarkInput]]):
 
 @dataclass(slots=True, kw_only=True)
 class Annotator:
-    """Turns what was said of a place into landmarks as seen from one pose.
+    """Turns the description of a place into landmarks as seen from one pose.
 
     Attributes:
         pictures: The pictures that can be spoken of.
-        laser: What the robot's laser meets now; None where nobody asked, or without one.
+        laser: The present ranges of the robot's laser; None where not asked for, or without one.
         refused: What stays out, each with its reason; filled as landmarks are taken.
     """
 
@@ -182,7 +182,7 @@ class Annotator:
         if thing.picture is not None and own is None:
             raise self._no_such_picture(thing.picture)
         _require_possible(thing, own)
-        # What the waypoint says of its picture holds for the landmark, too.
+        # The waypoint's picture also holds for the landmark.
         other = None if own == picture else own
         bearing_rad = _bearing_rad(thing, own)
         stood = pose if own is None else own.pose

@@ -1,4 +1,4 @@
-"""Who calls a tool, how they hear of a drive, and a person's word asked for through the client."""
+"""The caller of a tool, progress of its drives, and approval by a person through the client."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ def _shorten_wait(wait_s: Any) -> Any:  # noqa: ANN401 - what is no number is re
 
 
 AT_MOST_LONGEST_WAIT = BeforeValidator(_shorten_wait)
-"""Who would wait longer is answered sooner, and can call again."""
+"""A longer wait is cut to this; the client can call again."""
 
 
 def client_of(context: Context) -> str:
@@ -39,7 +39,7 @@ def client_of(context: Context) -> str:
 
 
 def find_reader(context: Context) -> str | None:
-    """Return who reads the answers: an HTTP session, or stdio's one client; None for nobody known.
+    """Return the reader of the answers: an HTTP session, or stdio's one client; None if unknown.
 
     Several clients may call over HTTP without a session.
     """
@@ -47,7 +47,7 @@ def find_reader(context: Context) -> str | None:
 
 
 def tell_progress(context: Context) -> OnProgress:
-    """Return what tells the caller how a drive stands."""
+    """Return the function that reports a drive's progress to the caller."""
 
     async def tell(report: DriveReport) -> None:
         left_m = report.status.distance_left_m
@@ -71,11 +71,11 @@ class Agreement(BaseModel):
 
 
 class Asking:
-    """Asks the person at one client, and takes answers to what was asked of that client alone.
+    """Asks the person at one client, and takes only answers to that client's questions.
 
     Args:
         context: Of the call.
-        approval: Who may be asked: with `queue` no client is.
+        approval: The place of approval: with `queue` no client is asked.
         client: Who calls.
     """
 
@@ -87,7 +87,7 @@ class Asking:
         self._client = client
 
     def take_answers(self, approvals: Approvals) -> bool:
-        """Grant what the person agreed to; False when they were asked and did not agree."""
+        """Grant the approved commands; return False when the person was asked and refused."""
         given = self._context.input_responses if self._context is not None else None
         answers = {key: each for key, each in (given or {}).items() if key.startswith(KEY)}
         for key, answer in answers.items():

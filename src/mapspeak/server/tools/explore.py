@@ -33,7 +33,7 @@ from mapspeak.session import Session
 
 USUAL_DRIVES = 50
 USUAL_DURATION_S = 600.0
-"""So far a person's word goes where a call has no bound of its own, in robot time."""
+"""Robot time for which an approval is valid where a call has no bound of its own."""
 
 
 class Covered(StrEnum):
@@ -179,7 +179,7 @@ class ExploreTools:
         try:
             return leave_out_shown(taken, self._session.memory.read(), thing)
         except SemanticMapError:
-            # The search goes on without what cannot be read; find_place says so.
+            # The search goes on without an unreadable memory; find_place says so.
             return taken
 
     def _require_camera(self) -> None:
@@ -195,7 +195,7 @@ class ExploreTools:
 
 
 def _exploring(n_goals: int | None, duration_s: float | None) -> Errand:
-    """Return what a person is asked for; where the call has no bound, their word has one."""
+    """Return the command to approve; where the call has no bound, the approval has one."""
     return Errand(
         what="explore",
         n_drives=USUAL_DRIVES if n_goals is None else n_goals,
@@ -209,7 +209,7 @@ def _searching(thing: str, max_looks: int, max_m: float) -> Errand:
 
 
 def _answer(report: Report, sighting: CameraSighting | None) -> CallToolResult:
-    """Return a report as text and data, and what the camera sees with it."""
+    """Return a report as text and data, with the camera's picture."""
     content: list[TextContent | ImageContent] = [
         TextContent(type="text", text=report.model_dump_json())
     ]

@@ -89,7 +89,7 @@ class FindTools:
 
 
 def find_point(world: WorldModel, words: str) -> Point:
-    """Return the point of a place that somebody names.
+    """Return the point of a named place.
 
     Raises:
         GoalError: There is no such place.
@@ -98,7 +98,7 @@ def find_point(world: WorldModel, words: str) -> Point:
 
 
 def find_room(world: WorldModel, words: str) -> str:
-    """Return the id of the room that somebody names, or that a place lies in.
+    """Return the id of a named room, or of the room that a place lies in.
 
     Raises:
         GoalError: There is no such place, or it lies in no room.

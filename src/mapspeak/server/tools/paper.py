@@ -180,7 +180,7 @@ class PaperTools:
         picture: TakenPicture | None,
         *seen: Landmarks | None,
     ) -> None:
-        """Ask what the laser meets now, where no picture has it for a direction told from here."""
+        """Fetch the laser's ranges, where no picture has them for a direction told from here."""
         if annotator.wants_laser(*seen, pose=pose, picture=picture):
             annotator.laser = await fetch_ring(self._session.robot)
 
@@ -237,7 +237,7 @@ class PaperTools:
 def _observation_pose(
     origin: Pose, x: float | None, y: float | None, yaw_deg: float | None
 ) -> Pose:
-    """Return the pose that was asked for; what it leaves open is the origin's."""
+    """Return the requested pose; take missing values from the origin."""
     if (x is None) != (y is None):
         raise SemanticMapError(
             "Only one of x and y was given.",

@@ -26,7 +26,7 @@ from mapspeak.session import Session
 
 MOST_STOPS = 20
 ERRAND_S = 1800.0
-"""A person's word for a route is good for so much robot time."""
+"""Robot time for which a person's approval of a route is valid."""
 
 Stops = Annotated[
     list[Annotated[str, Field(min_length=1, max_length=200)]] | None,
@@ -120,7 +120,7 @@ class RouteTools:
 
 
 def _errand_of(stops: Sequence[str], plan: RoutePlan, *, looks_around: bool) -> Errand:
-    """Return what a person agrees to: the drives to all stops, and the turns at them."""
+    """Return the commands to approve: the drives to all stops, and the turns at them."""
     past = f"drive past {'; '.join(shorten(each) for each in stops)}"
     what = f"{past} and look around at each" if looks_around else past
     n_turns = MOST_PICTURES if looks_around else 0

@@ -1,4 +1,4 @@
-"""What the robot's camera and laser show now: the picture with its caption, rings for records."""
+"""The present views of camera and laser: the picture with its caption, rings for records."""
 
 import math
 from collections.abc import Iterator
@@ -15,9 +15,9 @@ from mapspeak.session import Session
 
 
 async def fetch_ring(robot: Robot) -> LaserRing | None:
-    """Return what the laser meets; None where there is none, or none that answers in time.
+    """Return the laser's ring of ranges; None without a laser, or without its answer in time.
 
-    No picture and no write fails for want of it, nor takes longer than `SCAN_PATIENCE_S` for it.
+    A picture or a write does not fail without it, nor wait longer than `SCAN_PATIENCE_S` for it.
     """
     if not robot.description.has_laser:
         return None
@@ -36,10 +36,10 @@ async def fetch_ring(robot: Robot) -> LaserRing | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSighting:
-    """A picture of the front camera, and what is to be said of it.
+    """A picture of the front camera, and its caption.
 
     Attributes:
-        text: Where it was taken, and what the robot's own detector reports in it.
+        text: Where it was taken, and the reports of the robot's own detector in it.
         picture: The picture.
         detections: The same reports as values; none where the robot has no detector.
     """
@@ -90,7 +90,7 @@ async def look_ahead(session: Session) -> CameraSighting:
 
 
 def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:
-    """Return what was measured, for the records that may be made of the picture."""
+    """Return the measurements for records that may be made of the picture."""
     for seen in detections:
         if detector is not None and seen.range_m is not None:
             yield PictureReading(

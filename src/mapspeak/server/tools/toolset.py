@@ -1,4 +1,4 @@
-"""A tool as mapspeak declares it: a function, what it does to the world, a schema without waste."""
+"""A tool as mapspeak declares it: a function, its effect on the world, and a lean schema."""
 
 import inspect
 from collections.abc import Awaitable, Callable, Mapping
@@ -29,10 +29,10 @@ class Tool:
 
     Attributes:
         function: The coroutine function; its docstring is the tool's description.
-        title: How a person reads it in a list.
-        effect: What it changes.
+        title: Its name for people in a list.
+        effect: Its effect.
         has_report: It answers with a pydantic report; else with text and pictures.
-        is_entry: A model should see it at once, even where tools are searched for.
+        is_entry: A model should see it at once, even where clients search for tools.
         leads: Sentences about other tools, which follow the description where these are offered.
         former: The names that its arguments had before, which are taken too, with today's.
     """
@@ -47,12 +47,12 @@ class Tool:
 
     @property
     def name(self) -> str:
-        """What a client calls it."""
+        """Its name for clients."""
         return self.function.__name__
 
     @property
     def arguments(self) -> frozenset[str]:
-        """The names of what it takes."""
+        """The names of its arguments."""
         return frozenset(inspect.signature(self.function).parameters) - {"context"}
 
     @property
@@ -75,7 +75,7 @@ class Tool:
 
     @property
     def description(self) -> str:
-        """What a model reads: the docstring, a line for each of its paragraphs, and the leads.
+        """Its description for a model: the docstring, one line for each paragraph, and the leads.
 
         A sentence that leads to a tool, as "Ask {find_place} first.", is there where that is
         offered.
@@ -149,11 +149,11 @@ Schema = Any
 
 REF = "#/$defs/"
 CHECKED = ("title", "minLength", "maxLength", "maxItems", "additionalProperties")
-"""What a model reads nothing in before it has broken it, and is told of then."""
+"""Keys of a schema that a model need not read: a call that violates them gets an error."""
 
 
 def lean_input(schema: Schema) -> Schema:
-    """Return the schema of a tool's arguments: what may be left out need not be null as well."""
+    """Return the schema of a tool's arguments: an optional one need not be null as well."""
     lean = _rewrite(_rewrite(_flatten(schema), _without(CHECKED)), _short_optional)
     return {**lean, "properties": _tell_items_once(lean.get("properties", {}))}
 
@@ -189,7 +189,7 @@ def _flatten(schema: Schema) -> Schema:
     def place(part: dict[str, Schema]) -> dict[str, Schema]:
         if "$ref" not in part:
             return part
-        # What a class is says nothing to a model that its field does not.
+        # The description of a class adds nothing for a model to that of its field.
         named = _without(("description",))(definitions[part["$ref"].removeprefix(REF)])
         return place({**named, **_without(("$ref",))(part)})
 

@@ -1,4 +1,4 @@
-"""Who publishes, hears and serves what: asked of every node, as ROS has no list of it."""
+"""Publishers, subscribers and servers: asked of every node, as ROS has no list of them."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ class Nodes:
 
     @property
     def is_empty(self) -> bool:
-        """True when nobody is there, not even we."""
+        """True without any node, ours included."""
         return not self.others and self.ours is None
 
     @property
     def is_ours_alone(self) -> bool:
-        """True when only we are there."""
+        """True when only our node is there."""
         return not self.others and self.ours is not None
 
     def say(self) -> str:
@@ -51,12 +51,12 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Census:
-    """What all nodes do.
+    """The topics and services of all nodes.
 
     Attributes:
         links: By the nodes' names.
-        mute: Nodes that did not tell.
-        own: What of it is our doing.
+        mute: Nodes that did not answer.
+        own: Our own part of it.
     """
 
     links: Mapping[str, NodeLinks]
@@ -64,18 +64,18 @@ class Census:
     own: OwnEnds
 
     def publishers_of(self, topic: str) -> Nodes:
-        """Return who publishes a topic."""
+        """Return the publishers of a topic."""
         found = [name for name, links in self.links.items() if topic in links.publishes]
         return _tell_apart(found, self.own.node if topic in self.own.publishes else "")
 
     def hearers_of(self, topic: str) -> Nodes:
-        """Return who listens to a topic."""
+        """Return the subscribers of a topic."""
         found = [name for name, links in self.links.items() if topic in links.subscribes]
         return _tell_apart(found, self.own.node if topic in self.own.hears else "")
 
 
 async def take_census(connection: RosConnection, nodes: Iterable[str]) -> Census:
-    """Ask every node what it does, some at once: a question for each, two for each topic else."""
+    """Ask every node, some at once: one question for each, instead of two for each topic."""
     links: dict[str, NodeLinks] = {}
     limiter = anyio.CapacityLimiter(MOST_AT_ONCE)
     asked = sorted(nodes)
@@ -98,7 +98,7 @@ async def take_census(connection: RosConnection, nodes: Iterable[str]) -> Census
 
 
 async def fetch_publishers(connection: RosConnection, topic: str) -> Nodes:
-    """Return who publishes one topic."""
+    """Return the publishers of one topic."""
     own = connection.own_ends
     return _tell_apart(
         await connection.fetch_publishers(topic), own.node if topic in own.publishes else ""
@@ -106,7 +106,7 @@ async def fetch_publishers(connection: RosConnection, topic: str) -> Nodes:
 
 
 async def fetch_hearers(connection: RosConnection, topic: str) -> Nodes:
-    """Return who listens to one topic."""
+    """Return the subscribers of one topic."""
     own = connection.own_ends
     return _tell_apart(
         await connection.fetch_subscribers(topic), own.node if topic in own.hears else ""

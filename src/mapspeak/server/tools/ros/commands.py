@@ -22,9 +22,9 @@ from mapspeak.server.text.offered import lead
 from mapspeak.session import Session
 
 SETTLE_S = 0.3
-"""From the first advertisement until the robot's nodes hear what is published, in wall time."""
+"""From the first advertisement until the robot's nodes receive messages, in wall time."""
 LONGEST_SETTLE_S = 1.0
-"""So much longer where the robot, under load, does not know yet that anybody publishes."""
+"""Longest further wait where a robot under load does not know the publisher yet."""
 LOOK_S = 0.1
 N_STANDS = 3
 PAUSE_S = 0.05
@@ -73,7 +73,7 @@ class RosCommands:
             self._advertised.add((topic, type_name))
 
     async def _wait_until_known(self, topic: str) -> None:
-        """Return when the robot knows somebody who publishes, or cannot say, or after a while."""
+        """Return when the robot knows a publisher, cannot answer, or the time is over."""
         with suppress(LinkError), anyio.move_on_after(LONGEST_SETTLE_S):
             fetch = self._connection().fetch_publishers
             while not await fetch(topic):  # noqa: ASYNC110 - it happens in other programs
@@ -125,13 +125,13 @@ BY_HAND = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishRequest:
-    """What is to be published.
+    """A request to publish messages.
 
     Attributes:
         topic: Its full name.
         type: As this ROS writes it.
-        message: Each time the same.
-        is_moving: It is a velocity other than a stand, which a stand has to follow.
+        message: The same each time.
+        is_moving: It is a velocity other than zero, which zero velocity has to follow.
         duration_s: From the first message on, in wall time; None for a single message.
         rate_hz: Messages a second.
     """
@@ -145,7 +145,7 @@ class PublishRequest:
 
 
 class _Run:
-    """How far a publication has come."""
+    """The progress of a publication."""
 
     def __init__(self) -> None:
         self.started_s = anyio.current_time()
@@ -172,11 +172,12 @@ class Publisher:
         self._moving_until_s: dict[str, float] = {}
 
     async def publish(self, wanted: PublishRequest) -> str:
-        """Publish, and say what was sent and what it ended with.
+        """Publish, and say how much was sent and how it ended.
 
         Raises:
             GoalError: It is a velocity, and something else moves the robot.
-            LinkError: The robot was stopped before, or the connection was lost: says what was sent.
+            LinkError: The robot was stopped before, or the connection was lost: says how much was
+                sent.
         """
         with self._session.drives.preparing() as ticket:
             if not wanted.is_moving:
@@ -223,7 +224,7 @@ class Publisher:
         """Publish until the time is over or something else ends it.
 
         Raises:
-            LinkError: The connection was lost. What was begun does not go on when it is back.
+            LinkError: The connection was lost. The publication does not go on when it is back.
         """
         while run.n_sent / wanted.rate_hz < duration_s and not run.ended_by:
             await self._commands.publish_at_once(wanted.topic, wanted.message)
@@ -257,7 +258,7 @@ class Publisher:
     async def _check_that_nothing_moves(self, topic: str) -> None:
         drive = self._session.drives.under_way
         if drive is not None:
-            # It may have ended since somebody asked.
+            # It may have ended since the last report.
             await self._session.drives.report(drive.goal_id)
         drive = self._session.drives.under_way
         if drive is not None:
@@ -274,7 +275,7 @@ class Publisher:
             )
 
     def _say_what_moves(self, topic: str) -> str:
-        """Say what goes on moving the robot, though this message may be a stand."""
+        """Name another publication that still moves the robot, even after a zero velocity."""
         left_s = self._left_s(topic)
         if left_s is None:
             return "."

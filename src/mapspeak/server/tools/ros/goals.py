@@ -1,4 +1,4 @@
-"""Every goal that was sent with the ROS tools, by its handle, and what all tools of ROS share."""
+"""All goals sent with the ROS tools, by their handles, and the common part of all ROS tools."""
 
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class TrackedGoal:
 
 
 class ActionBook:
-    """Sends goals and keeps what becomes of them, also after their end.
+    """Sends goals and keeps their states, also after their end.
 
     Args:
         inquiry: Asks the robot.
@@ -62,11 +62,11 @@ class ActionBook:
             action: Its full name.
             goal: Fits its type.
             type_name: Of the action, as "package/Type".
-            client: Who has it sent: when that client is gone, the goal ends.
-            n_stops: Those that there had been when the goal was wanted.
+            client: The client that sends it: when that client is gone, the goal ends.
+            n_stops: The number of stops when the goal was requested.
 
         Raises:
-            GoalError: There was a stop since the goal was wanted.
+            GoalError: There was a stop since the goal was requested.
         """
         await self._inquiry.check_action(action)
         opened = await self._open(action, await self._inquiry.said(type_name, kind="action"))
@@ -100,7 +100,7 @@ class ActionBook:
         return job
 
     async def wait(self, job: TrackedGoal, *, wait_s: float) -> None:
-        """Wait until a goal is over, or so long in wall time."""
+        """Wait until a goal is over, or the time is, in wall time."""
         until_s = anyio.current_time() + wait_s
         while not job.goal.is_over and (left_s := until_s - anyio.current_time()) > 0:
             await job.goal.wait_until_over(within_s=min(left_s, POLL_S))
@@ -116,7 +116,7 @@ class ActionBook:
             await job.action.cancel(job.goal)
 
     async def cancel_all(self, action: str) -> int:
-        """End every goal of an action, whoever sent it; return how many there were."""
+        """End every goal of an action, of all clients; return how many there were."""
         client = await self._find_client(action)
         await client.wait_for_list()
         n_cancelled = await client.cancel_all(self._inquiry.connection)

@@ -1,4 +1,4 @@
-"""Asking a ROS system what it is made of: names checked, types described, the latest graph kept."""
+"""Queries to a ROS system: names checked, types described, the latest graph kept."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -24,12 +24,12 @@ NO_ROS = "This robot is no ROS robot: the simulated one is none."
 ACTION_GOAL = "ActionGoal"
 MOST_NEAR = 5
 KEPT_S = 1.0
-"""For so long a list of names is as good as new, in wall time."""
+"""How long a list of names counts as fresh, in wall time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Described:
-    """What a type looks like.
+    """The definition of a type.
 
     Attributes:
         type: As "package/Type".
@@ -43,7 +43,7 @@ class Described:
 
     @property
     def kind(self) -> str:
-        """What it is the type of: "msg", "srv" or "action"."""
+        """The kind of the type: "msg", "srv" or "action"."""
         return {1: "msg", 2: "srv", 3: "action"}[len(self.parts)]
 
     def say(self) -> str:
@@ -59,7 +59,7 @@ class Described:
 
 
 class RosInquiry:
-    """Asks over the session's connection; what it was told about names and types is kept.
+    """Asks over the session's connection; keeps the answers about names and types.
 
     Args:
         session: Holds the connection.
@@ -93,7 +93,7 @@ class RosInquiry:
         """Return the topics and actions there are, as they were a second ago at most."""
         if self._graph is None or anyio.current_time() > self._asked_s + KEPT_S:
             return await self._renew_graph()
-        # What is kept is no answer for a robot that has gone.
+        # The kept graph does not answer for a robot that has gone.
         await self.connection.wait_until_connected()
         return self._graph
 
@@ -111,7 +111,7 @@ class RosInquiry:
         return (self._graph or await self.fetch_graph()).dialect
 
     async def find_topic_type(self, topic: str) -> str | None:
-        """Return a topic's type as "package/Type"; ask again only for what it has not heard of."""
+        """Return a topic's type as "package/Type"; ask again only for an unknown topic."""
         graph = self._graph
         if graph is None or topic not in graph.types:
             graph = await (self._renew_graph() if graph is None else self._renew_topics(graph))
@@ -147,7 +147,7 @@ class RosInquiry:
         return actions_of(await self.fetch_graph())
 
     async def check_action(self, action: str) -> None:
-        """Return when there is such an action.
+        """Check that there is such an action.
 
         Raises:
             LinkError: There is none; names those most like it.
@@ -163,7 +163,7 @@ class RosInquiry:
         rosapi 2.1 does not tell it: then it is the one of that name, as Nav2 names its actions.
 
         Raises:
-            LinkError: There is no such action, or nobody tells its type.
+            LinkError: There is no such action, or its type is unknown.
         """
         await self.check_action(action)
         try:
@@ -178,7 +178,7 @@ class RosInquiry:
             return found
 
     async def check_node(self, node: str) -> None:
-        """Return when there is such a node.
+        """Check that there is such a node.
 
         Raises:
             LinkError: There is none; names those most like it.
@@ -188,16 +188,16 @@ class RosInquiry:
             raise self.stranger("node", node, nodes)
 
     async def describe(self, type_name: str) -> Described:
-        """Return what a type looks like.
+        """Return the definition of a type.
 
         Raises:
-            LinkError: It is no name of a type, or nobody knows it; says how to describe it.
+            LinkError: It is not a type's name, or is unknown; says how to describe it.
         """
         await self._check_type_name(type_name)
         bare = bare_type(type_name)
         texts = await self.connection.fetch_definitions(type_name)
         if not texts:
-            # Nobody but whoever taught us knows it.
+            # Only the client that taught us knows it.
             texts = self._taught
         parts = find_parts(texts, bare)
         if not parts:
@@ -208,7 +208,7 @@ class RosInquiry:
         graph = self._graph or await self.fetch_graph()
         package = bare_type(type_name).partition("/")[0]
         if bare_type(type_name) in kinds_of(known_definitions(graph.dialect)):
-            # Only rclpy says nothing of what mapspeak could describe: it could not send it.
+            # Only rclpy leaves out a type that mapspeak could describe: it could not send it.
             return LinkError(
                 f"Unknown type {type_name}: the ROS on this machine does not have it.",
                 hint=f"Install it: `sudo apt install ros-$ROS_DISTRO-{package.replace('_', '-')}`, "
@@ -225,11 +225,11 @@ class RosInquiry:
         )
 
     async def teach(self, type_name: str, definition: str) -> None:
-        """Keep the definition of a type that nobody else knows, while the session lasts.
+        """Keep the definition of an otherwise unknown type while the session lasts.
 
         Raises:
-            LinkError: It is no name of a type, or the robot or mapspeak knows that type, or the
-                text is no definition.
+            LinkError: It is not a type's name, or the robot or mapspeak knows that type, or the
+                text is not a definition.
         """
         await self._check_type_name(type_name)
         if await self.connection.fetch_definitions(type_name):

@@ -1,4 +1,4 @@
-"""The tools that measure what is published: the rates of topics, and the tree of frames."""
+"""The tools that measure publications: the rates of topics, and the tree of frames."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -24,7 +24,7 @@ from mapspeak.session import Session
 
 TRANSFORMS = "tf2_msgs/TFMessage"
 FRAMES_COME_S = 2.0
-"""For a frame that somebody sends to come, in wall time."""
+"""Longest wait for a published frame, in wall time."""
 
 LATE_PERIODS = 3.0
 LEAST_LATE_S = 1.0
@@ -72,7 +72,7 @@ class _Listener:
         try:
             transforms = read_transforms(message)
         except LinkError:
-            return  # Of one that cannot be read, ros_read shows what is wrong.
+            return  # ros_read shows the fault of an unreadable one.
         for each in transforms:
             key = (each.parent, each.child, is_static)
             link = self.links.get(key)
@@ -98,11 +98,11 @@ async def hear_frames(
     duration_s: float,
     wanted: AbstractSet[str] = frozenset(),
 ) -> list[FrameLink]:
-    """Return the transforms that come in a time, those that are kept for latecomers too.
+    """Return the transforms that come in a time, latched ones included.
 
     Args:
         connection: To listen with.
-        topics: Name, type as this ROS writes it, and whether what comes never changes.
+        topics: Name, type as this ROS writes it, and whether its transforms are static.
         duration_s: In wall time.
         wanted: Once all these frames have come, it ends; empty to listen for the whole time.
     """
@@ -178,7 +178,7 @@ def _frames_in(value: object) -> Iterator[str]:
 
 
 def say_frames(links: Sequence[FrameLink], *, now_s: float, heard_s: float) -> str:
-    """Return the frames as a tree, after what is wrong with it.
+    """Return the frames as a tree, after its faults.
 
     Args:
         links: As they were heard.
@@ -209,7 +209,7 @@ def _walk(links: Sequence[FrameLink], roots: Sequence[str]) -> Iterator[tuple[Fr
         while stack:
             link, depth = stack.pop()
             yield link, depth
-            # A frame with two parents is told at both; what hangs on it, once.
+            # A frame with two parents is listed under both; its children, once.
             if link.child not in reached:
                 reached.add(link.child)
                 stack += [(each, depth + 1) for each in below.get(link.child, [])]

@@ -226,7 +226,7 @@ class NodeTools:
         return values
 
     async def _describe(self, node: str, names: list[str]) -> dict[str, str]:
-        """Return what a node of ROS 2 says of its parameters."""
+        """Return a ROS 2 node's descriptions of its parameters."""
         if not names or await self._inquiry.fetch_dialect() is Dialect.ROS1:
             return {}
         try:

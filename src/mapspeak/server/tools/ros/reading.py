@@ -20,14 +20,14 @@ LEAST_SILENCE_S = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Heard:
-    """What came on a topic; all times in wall time.
+    """The messages of a topic; all times in wall time.
 
     Attributes:
         messages: The latest, in their order.
         n_received: All that came while we listened; 0 when the latest had come before.
         listened_s: How long we listened.
-        age_s: Since the latest came; infinite where none ever did.
-        known_for_s: Since the topic is listened to, by whomever of us.
+        age_s: Since the latest came; infinite where none came.
+        known_for_s: Since the first of our subscriptions to the topic.
         period_s: Between two messages; None where fewer than two came.
     """
 
@@ -40,7 +40,7 @@ class Heard:
 
     @property
     def rate_hz(self) -> float:
-        """Messages a second, by the times between them; where there are none, by their number."""
+        """Messages a second, by the times between them; without these, by their number."""
         if self.period_s is None:
             return self.n_received / self.listened_s
         return 1.0 / self.period_s
@@ -77,9 +77,9 @@ async def hear(
         type_name: As this ROS writes it.
         is_bulky: Messages hold large arrays.
         n: How many messages are wanted at most.
-        wait_s: Without a duration: how long to wait for so many.
-        duration_s: How long to listen; 0 ends with the last message that is wanted. Where somebody
-            listens already, a topic's latest message counts.
+        wait_s: Without a duration: how long to wait for them.
+        duration_s: How long to listen; 0 ends with the last wanted message. With a subscription
+            already open, a topic's latest message counts.
         renew_s: Waits for a first message, after each of which the topic is asked for anew.
     """
     subscription = connection.subscribe(topic, type_name=type_name, is_bulky=is_bulky)
@@ -111,7 +111,7 @@ class _Collector:
             self.messages.append(self._subscription.latest)
 
     async def collect(self, until: int | None) -> None:
-        """Take messages as they come, until there are so many or it is cancelled."""
+        """Take messages as they come, until there are enough or it is cancelled."""
         while until is None or len(self.messages) < until:
             await self.take_next(timeout_s=60.0)
 
@@ -128,7 +128,7 @@ class _Collector:
         return True
 
     def result(self, started_s: float) -> Heard:
-        """Return what came since a moment of the event loop's clock."""
+        """Return the messages since a moment of the event loop's clock."""
         now_s, known = anyio.current_time(), self._subscription
         return Heard(
             messages=tuple(self.messages),

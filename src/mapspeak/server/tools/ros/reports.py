@@ -44,7 +44,7 @@ def show_value(value: object) -> str:
 
 
 def cut(text: str, *, most: int = LONGEST_ANSWER) -> str:
-    """Return at most so many letters of a text, and say how many there were."""
+    """Return the first letters of a text, and say how many there were."""
     if len(text) <= most:
         return text
     return f"{text[: most - 60]}\n... cut: {len(text):,} letters in all."

@@ -36,7 +36,7 @@ FOLDED = {
     "loggers": ("logger", r".+/(?:get_loggers|set_logger_level|[gs]et_logger_levels)"),
     "rosapi": ("rosapi", r".*/rosapi(?:_params)?/\w+"),
 }
-"""Services that every node has, and rosapi's: what is said of them, the filter that shows them."""
+"""Services that every node has, and rosapi's: their summary, and the filter that shows them."""
 
 
 class ServiceTools:

@@ -305,7 +305,7 @@ def _say_heard(heard: Heard, duration_s: float) -> str:
 
 
 def _say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:
-    """Name the topics with an end where nobody is, and the nodes that did not tell."""
+    """Name the topics without a publisher or a subscriber, and the nodes that did not answer."""
     unsaid = [topic for topic in topics if not census.publishers_of(topic).others]
     unheard = [topic for topic in topics if census.hearers_of(topic).is_empty]
     ours = [topic for topic in topics if census.hearers_of(topic).is_ours_alone]

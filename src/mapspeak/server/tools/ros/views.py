@@ -54,7 +54,7 @@ def read_cloud(message: Message) -> PointCloud:
     """Read sensor_msgs/PointCloud2, in either byte order, rows padded or not.
 
     Raises:
-        LinkError: It is none, or its points have no x, y and z.
+        LinkError: It is invalid, or its points have no x, y and z.
     """
     frame_id, _ = read_header(message)
     width, height, point_step, row_step = (
@@ -150,8 +150,8 @@ class MessageView:
     """A message as it is shown.
 
     Attributes:
-        text: What it says; a picture shows nothing else.
-        picture: None where there is nothing to see.
+        text: Its content; a picture shows nothing else.
+        picture: None without anything to see.
     """
 
     text: str
@@ -161,7 +161,7 @@ class MessageView:
 def view_message(type_name: str, message: Message) -> MessageView:
     """Return a message of a type, named as "package/Type", for a model to read.
 
-    What is not what its type says is shown field by field, with the reason.
+    A message that contradicts its type is shown field by field, with the reason.
     """
     view = VIEWS.get(type_name)
     if view is None:
@@ -328,17 +328,17 @@ VIEWS: Mapping[str, Callable[[Message], MessageView]] = {
 VIEWED: frozenset[str] = frozenset(VIEWS)
 """Types that are shown in a way of their own."""
 BULKY: frozenset[str] = VIEWED - {"tf2_msgs/TFMessage", "nav_msgs/Path"}
-"""Types of large arrays, none of them of fixed length: these come faster in binary."""
+"""Types of large arrays without fixed length, which come faster in binary."""
 
 
 def view_fields(
     fields: Iterable[Field], values: Mapping[str, Any]
 ) -> tuple[dict[str, MessageView], dict[str, Any]]:
-    """Return the views of the fields that are shown in a way of their own, and the other fields.
+    """Return the views of the fields that have one, and the other fields.
 
     Args:
         fields: Of the type of a response or a result.
-        values: What it holds.
+        values: Its values.
     """
     views = {
         field.name: view_message(field.type, values[field.name])

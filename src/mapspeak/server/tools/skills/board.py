@@ -98,7 +98,7 @@ class SkillBoard:
         self.n_changes += 1
 
     def take_down(self, name: str) -> None:
-        """Offer a skill no longer; what runs of it goes on."""
+        """Withdraw a skill; its runs go on."""
         if self._skills.pop(name, None) is not None:
             del self._listed[name]
             self.n_changes += 1

@@ -170,7 +170,7 @@ class SkillBook:
         return self._guard(owned, is_own=is_ros)
 
     async def _find_called(self, entry: OwnersEntry) -> Skill:
-        """Return what a skill of skills.yaml calls, as the robot offers it now.
+        """Return the interface that a skill of skills.yaml calls, as the robot offers it now.
 
         Raises:
             MapspeakError: The robot does not offer it.
@@ -195,7 +195,7 @@ class SkillBook:
         return await open_interface(interface, self._ros, name=entry.spec.name)
 
     async def check_entry(self, entry: OwnersEntry) -> str:
-        """Return what is wrong with a skill of skills.yaml at this robot; empty when nothing is."""
+        """Return the fault of a skill of skills.yaml at this robot; empty without one."""
         try:
             if (plan := _plan_of(entry)) is not None:
                 self.desk.check(plan)

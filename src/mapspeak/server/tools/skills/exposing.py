@@ -1,4 +1,4 @@
-"""Which interfaces of a robot are tools: found when it offers them, withdrawn when it does not."""
+"""Interfaces of a robot as tools: found when it offers them, withdrawn when it does not."""
 
 import fnmatch
 import logging
@@ -28,22 +28,22 @@ from mapspeak.server.tools.skills.interfaces import (
 MOST_EXPOSED = 100
 """Tools; a model that reads more of them reads nothing else."""
 EVERY_S = 2.0
-"""Wall time between two looks at what the robot offers."""
+"""Wall time between two looks at the robot's interfaces."""
 KEPT_S = 20.0
-"""Wall time for which a type, and who is at a topic, is not asked for again while it is there."""
+"""Wall time for which a type, or the ends of a topic, are not asked for again while it is there."""
 PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
 
 logger = logging.getLogger(__name__)
 
 
 class Exposure:
-    """Keeps the board to what the robot offers of some names.
+    """Keeps the board in step with the robot's interfaces of some names.
 
     Args:
         ros: The way to the robot.
         board: Where the tools are put up.
         patterns: Of full names, as the shell writes them: "/gripper/*".
-        tell: Told when tools have changed.
+        tell: Called when tools have changed.
         every_s: Between two looks.
     """
 
@@ -83,7 +83,7 @@ class Exposure:
         self._left_out.clear()
 
     async def look(self) -> None:
-        """Put up what is new, take down what is gone, and tell clients where that is anything.
+        """Put up new interfaces, take down those that are gone, and tell clients of any change.
 
         Raises:
             LinkError: The robot cannot be asked.
@@ -122,10 +122,10 @@ class Exposure:
         return await open_interface(interface, self._ros, name=name, reserved=RESERVED)
 
     def _check_policy(self, interface: Interface) -> None:
-        """Return when the policy does not deny an interface for its name.
+        """Check that the policy does not deny an interface for its name.
 
         Raises:
-            PolicyError: It does: what would always be refused is no tool.
+            PolicyError: It does: a tool that is always refused is not offered.
         """
         command = _command_of(interface)
         connection = self._ros.inquiry.connection
@@ -138,7 +138,7 @@ class Exposure:
             raise PolicyError("The policy denies it.", hint="A person can allow it in policy.yaml.")
 
     async def _find(self) -> list[Interface]:
-        """Return what the robot offers now of what is asked for."""
+        """Return the requested interfaces that the robot offers now."""
         connection = self._ros.inquiry.connection
         graph = await connection.fetch_graph()
         services = await connection.fetch_services()
@@ -166,7 +166,7 @@ class Exposure:
     async def _ask(
         self, find: Callable[..., Awaitable[list[Interface]]], name: str, *more: str
     ) -> list[Interface]:
-        """Return what is found by a name; what was found lately, or before an error, is as good."""
+        """Return the answer for a name; reuse a recent one, or at an error the last one."""
         known, asked_s = self._answers.get(name, ([], -math.inf))
         if anyio.current_time() < asked_s + KEPT_S:
             return known
@@ -184,7 +184,7 @@ class Exposure:
         return [Interface(InterfaceKind.SERVICE, service, bare_type(kind))]
 
     async def _find_sides(self, topic: str, kind: str) -> list[Interface]:
-        """Return whether a topic is read or published on: by who else is there."""
+        """Return whether a topic is read or published on, by its other ends."""
         connection = self._ros.inquiry.connection
         ends = {
             InterfaceKind.READ: await fetch_publishers(connection, topic),

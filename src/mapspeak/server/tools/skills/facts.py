@@ -1,4 +1,4 @@
-"""What is so now, asked of a session: for the conditions of skills and missions."""
+"""The present facts of a session, for the conditions of skills and missions."""
 
 from datetime import datetime
 
@@ -19,8 +19,8 @@ class SessionFacts:
     """Facts of one session.
 
     Args:
-        session: What is asked.
-        ros: Where a battery may be told of.
+        session: The session to ask.
+        ros: The ROS system that may publish a battery.
     """
 
     def __init__(self, session: Session, ros: RosAccess) -> None:

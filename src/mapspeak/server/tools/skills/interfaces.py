@@ -35,7 +35,7 @@ from mapspeak.skills.layout import build_layout
 
 
 class InterfaceKind(StrEnum):
-    """What of a robot can be a skill."""
+    """The kinds of a robot's interfaces that can be skills."""
 
     SERVICE = "service"
     ACTION = "action"
@@ -79,7 +79,7 @@ DURATION = SkillParameter(
     most=20.0,
     is_required=True,
 )
-"""What a velocity takes besides: without an end the robot would go on."""
+"""The extra argument of a velocity: without an end the robot would go on."""
 OUTCOMES = {
     ActionState.SUCCEEDED: (SkillState.SUCCEEDED, SkillCode.DONE),
     ActionState.ABORTED: (SkillState.FAILED, SkillCode.ABORTED),
@@ -90,7 +90,7 @@ OUTCOMES = {
 
 
 class InterfaceSkill(ABC):
-    """What all skills of one interface have in common.
+    """The common part of all skills of one interface.
 
     Args:
         interface: What it calls.
@@ -127,7 +127,7 @@ class InterfaceSkill(ABC):
 
     @property
     def spec(self) -> SkillSpec:
-        """What is known of it."""
+        """Its description."""
         return self._spec
 
     @property
@@ -146,8 +146,8 @@ class InterfaceSkill(ABC):
         """Return the message that the arguments are, as its type wants it.
 
         Raises:
-            LinkError: It does not fit, or names a frame that nobody knows.
-            SkillError: An argument is not taken, or cannot be so.
+            LinkError: It does not fit, or names an unknown frame.
+            SkillError: An argument is unknown, or has a wrong value.
         """
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
         given.pop(DURATION.name, None)
@@ -158,7 +158,7 @@ class InterfaceSkill(ABC):
         return message
 
     def read(self, part: int, message: Message) -> dict[str, JsonValue]:
-        """Return what came back, named as arguments would be."""
+        """Return the answer, named as arguments would be."""
         try:
             return build_layout(self.described.book, self.described.parts[part]).read(message)
         except LinkError:
@@ -171,7 +171,7 @@ class ServiceSkill(InterfaceSkill):
     async def run(
         self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
     ) -> SkillOutcome:
-        """Call it; an answer that says of itself that it is no success has failed."""
+        """Call it; an answer that reports its own failure is a failure."""
         del on_progress
         name = self.interface.name
         said = await self.ros.inquiry.said(self.interface.type, kind="srv")
@@ -232,7 +232,7 @@ class ActionSkill(InterfaceSkill):
                 on_progress(SkillProgress(values=self.read(2, feedback)))
 
     async def _end(self, tracked: TrackedGoal) -> str:
-        """Cancel a goal, and return what its server says against it."""
+        """Cancel a goal, and return its server's objection."""
         try:
             await self.ros.goals.cancel(tracked)
         except MapspeakError as error:
@@ -322,7 +322,7 @@ async def open_interface(
     """Return the skill that an interface is.
 
     Raises:
-        LinkError: Nobody describes its type, or it cannot be described.
+        LinkError: Its type is not described, or cannot be.
     """
     said = await ros.inquiry.said(interface.type, kind=KINDS[interface.kind])
     described = await ros.inquiry.describe(said)

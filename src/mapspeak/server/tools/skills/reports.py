@@ -43,7 +43,7 @@ GOES_ON = "It goes on. {skill_status} waits for it. {cancel_skill} ends it."
 
 
 def describe_skill(spec: SkillSpec) -> str:
-    """Return what a model reads of a skill before it runs it; its owner's words are quoted."""
+    """Return the description of a skill for a model; its owner's words are quoted."""
     said = f": {quote(spec.description, most=MOST_SENTENCE)}." if spec.description else "."
     needs = "; ".join(map(say_precondition, spec.preconditions))
     parts = [f"Run the robot's skill {spec.name}{said}", EFFECTS[spec.effect]]
@@ -53,7 +53,7 @@ def describe_skill(spec: SkillSpec) -> str:
 
 
 def say_precondition(precondition: Precondition) -> str:
-    """Return what must hold, in words."""
+    """Return a precondition in words."""
     match precondition.kind:
         case PreconditionKind.BATTERY_ABOVE:
             return f"the battery above {100 * (precondition.ratio or 0):.0f} %"
@@ -64,7 +64,7 @@ def say_precondition(precondition: Precondition) -> str:
 
 
 def say_run(run: SkillRun, questions: QuestionBook | None = None) -> str:
-    """Return how a run stands, with what it told last or gave in the end.
+    """Return the state of a run, with its latest progress or its result.
 
     Args:
         questions: Those that wait, where it is a mission that may ask some.
@@ -84,7 +84,7 @@ def say_run(run: SkillRun, questions: QuestionBook | None = None) -> str:
 
 
 def _say_account(account: Sequence[str]) -> str:
-    """Return what a mission has done; texts of others stand in it, so that it is quoted."""
+    """Return the steps of a mission; they hold texts of others, and are quoted."""
     lines = (f"- {clean_line(each)}" for each in account)
     return "\n".join(["Done (observed, no instruction):", *lines]) if account else ""
 

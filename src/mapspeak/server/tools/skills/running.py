@@ -54,7 +54,7 @@ class SkillRunTools:
 
 
 def tell_news(context: Context) -> OnNews:
-    """Return what tells a caller of progress."""
+    """Return the function that reports progress to a caller."""
 
     async def tell(run: SkillRun) -> None:
         await context.report_progress(run.passed_s, message=say_progress(run))
