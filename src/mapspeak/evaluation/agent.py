@@ -1,6 +1,6 @@
-"""What an agent is, what it is given and how it ends, and the client by which it calls tools.
+"""Agents: their assignment, how they end, and the client by which they call tools.
 
-Every call goes past a witness, which hears the answer too.
+A witness sees every call and its answer.
 """
 
 import base64
@@ -18,7 +18,7 @@ from mapspeak.evaluation.trials import Limits, TokenCounts, ToolCall, TrialState
 
 
 class OutOfBudgetError(MapspeakError):
-    """A call would have gone beyond what was allowed; whoever gave the limits catches it."""
+    """A call would have exceeded the limits; the code that set the limits catches this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolAnswer:
-    """What a tool answered.
+    """Answer of a tool.
 
     Attributes:
-        report: The structured part; empty where there is none.
-        is_error: The tool could not do what was asked; the text says why.
+        report: The structured part; empty without one.
+        is_error: The tool failed; the text says why.
     """
 
     text: str
@@ -86,11 +86,11 @@ class ToolClient:
     witness: Witness = field(default_factory=Witness)
 
     async def call(self, tool: str, /, **arguments: object) -> ToolAnswer:
-        """Call a tool and return its answer, also when that is an error.
+        """Call a tool and return its answer, even if that is an error.
 
         Raises:
             LinkError: There is no client.
-            OutOfBudgetError: The witness does not let it be made.
+            OutOfBudgetError: The witness refuses it.
         """
         client = self._connected()
         self.witness.hear_call(tool, arguments)
@@ -138,7 +138,7 @@ def _read(result: CallToolResult) -> ToolAnswer:
 
 
 class ServerAccess(StrEnum):
-    """How an agent reaches the robot's server."""
+    """Connection of an agent to the robot's server."""
 
     MEMORY = "memory"
     """In the trial's own process: for scripts, which need no pipe."""
@@ -151,13 +151,13 @@ class ServerAccess(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assignment:
-    """What an agent is given.
+    """Assignment of an agent.
 
     Attributes:
         system: The server's instructions and the guidance of the task.
-        seed: Of anything it draws.
+        seed: For all its random draws.
         server: The command line of its server, for agents that start it themselves.
-        folder: The trial's; an agent may keep files of its own there.
+        folder: The trial's folder; an agent may keep files there.
     """
 
     prompt: str
@@ -170,7 +170,7 @@ class Assignment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AgentEnd(TokenCounts):
-    """How an agent ended: finished, gave_up or out_of_budget.
+    """End of an agent: finished, gave_up or out_of_budget.
 
     Attributes:
         n_decisions: Model turns; None counts the calls.

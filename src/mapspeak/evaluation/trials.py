@@ -61,10 +61,10 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What a trial may cost before it is ended.
+    """Budget of a trial.
 
     Attributes:
-        wall_s: Of the wall clock; a trial that needs more is killed and counts as hung.
+        wall_s: Wall time; a trial that needs more is killed and counts as hung.
     """
 
     n_calls: int = 60
@@ -74,24 +74,24 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """What a task makes of a world for one trial.
+    """Setting of a task in a world for one trial.
 
     Attributes:
-        guidance: What it is told besides, before it begins, such as the exploration prompt.
-        start: Where the robot stands at first, in the world's own frame.
-        is_known: The robot has the finished map of the world and finds its place in it; else it
-            maps from nothing, and the map frame begins at `start`.
+        guidance: Further instructions before it begins, such as the exploration prompt.
+        start: The robot's first pose, in the world's own frame.
+        is_known: The robot localises in the finished map of the world; else it maps from nothing,
+            and the map frame begins at `start`.
         memory: The semantic map to start with, as YAML; None for an empty one.
-        added: Things that stand in the world and that neither map nor memory knows.
-        shut: Doors that are shut at first, by name.
-        battery_ratio: How full the battery is at first.
-        n_faults: How often each skill fails before it works.
-        toolsets: Groups of tools that are offered; None for the server's usual ones.
-        tools: Single tools besides.
-        inspected: The ROS that is asked about instead of the simulated robot, which then is not
-            there; None for the simulated robot.
-        truth: What the scorer has to know, as JSON; never shown to an agent but the oracle. Where
-            a right answer needs no drive, it is under "said".
+        added: Things in the world that are not in the map or the memory.
+        shut: Names of doors that are shut at first.
+        battery_ratio: Initial charge of the battery.
+        n_faults: Number of failures of each skill before it works.
+        toolsets: Offered groups of tools; None for the server's default.
+        tools: Further single tools.
+        inspected: The ROS to inspect instead of the simulated robot, which is then absent; None
+            for the simulated robot.
+        truth: The scorer's data as JSON; shown only to the oracle agent. A right answer that needs
+            no drive is under "said".
     """
 
     prompt: str
@@ -111,7 +111,7 @@ class Setting:
 
 
 class TrialState(StrEnum):
-    """How a trial came to its end."""
+    """End of a trial."""
 
     FINISHED = "finished"
     GAVE_UP = "gave_up"
@@ -126,7 +126,7 @@ class TrialState(StrEnum):
 
 
 class Failure(StrEnum):
-    """What kind of mistake made a trial fail."""
+    """Kind of mistake that made a trial fail."""
 
     CORRIDOR_FOR_ROOM = "corridor_for_room"
     WRONG_SIZE = "wrong_size"
@@ -145,10 +145,10 @@ class Failure(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """What the simulator's truth says of a trial.
+    """Score of a trial by the simulator's truth.
 
     Attributes:
-        failure: What kind of mistake was made; None for a success.
+        failure: Kind of mistake; None for a success.
         figures: By name with its unit: coverage_recall, distance_to_object_m, ...
     """
 
@@ -168,12 +168,12 @@ class ToolCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TokenCounts:
-    """What a model has read and written; None where there was none, or nobody counted.
+    """Tokens of a model; None if there was no model, or no count.
 
     Attributes:
-        n_input_tokens: Read, cached ones included.
-        n_output_tokens: Written, thoughts included.
-        n_picture_tokens: What of the input pictures were.
+        n_input_tokens: Input, cached ones included.
+        n_output_tokens: Output, thoughts included.
+        n_picture_tokens: Part of the input that was pictures.
     """
 
     n_input_tokens: int | None = None
@@ -218,15 +218,15 @@ class Turn(TokenCounts):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialResult(TokenCounts):
-    """Everything that is kept of a trial, but for its turns, which lie beside it.
+    """Record of a trial, except its turns, which are stored beside it.
 
     Attributes:
-        shortest_m: How far the robot had to drive; None where the task has no such way.
-        n_decisions: Times that the agent chose what to do next: model turns, or calls of a script.
-        n_errors: Tool calls that were answered with an error.
-        cpu_s: What this machine computed for it, on all cores together, in the trial's own process;
-            a server or a client program that runs as another process is not in it.
-        error: What broke the trial; None where nothing did.
+        shortest_m: Shortest possible driving distance; None if the task has none.
+        n_decisions: Number of the agent's decisions: model turns, or calls of a script.
+        n_errors: Number of tool calls answered with an error.
+        cpu_s: CPU time of the trial's own process, on all cores together; excludes a server or
+            client program that runs as another process.
+        error: The error that broke the trial; None without one.
     """
 
     trial: Trial
@@ -263,7 +263,7 @@ def find_result(run: Path, trial: Trial) -> Path | None:
 
 
 def write_result(run: Path, result: TrialResult) -> None:
-    """Write result.json so that it is there whole or not at all."""
+    """Write result.json atomically."""
     folder = trial_folder(run, result.trial)
     folder.mkdir(parents=True, exist_ok=True)
     write_whole(folder / RESULT, _RESULT.dump_json(result, indent=2) + b"\n")
@@ -293,7 +293,7 @@ def turn_line(turn: Turn) -> bytes:
 
 
 def read_turns(run: Path, trial: Trial) -> tuple[Turn, ...]:
-    """Read every whole line of a trial's conversation; none where there is no such file."""
+    """Read every whole line of a trial's conversation; none without such a file."""
     path = trial_folder(run, trial) / TURNS
     if not path.exists():
         return ()

@@ -15,7 +15,7 @@ from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map
 
 OWN_WALLS = "map.yaml"
-"""What those of a memory's own frame are called, unless the memory says otherwise."""
+"""Default name of the walls of a memory's own frame."""
 
 
 class KeptWalls(Protocol):
@@ -25,7 +25,7 @@ class KeptWalls(Protocol):
     """
 
     def load(self, name: str) -> OccupancyGrid | None:
-        """Return a map that was kept; None where there is none of that name."""
+        """Return a kept map; None if there is none of that name."""
 
     def keep(self, grid: OccupancyGrid, name: str, *, is_first: bool = False) -> bool:
         """Write a map in place of the one of that name; it lasts when this returns.

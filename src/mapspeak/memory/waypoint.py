@@ -12,7 +12,7 @@ from mapspeak.memory.quoting import clean_line, clean_text, name_key
 
 
 class Confidence(StrEnum):
-    """How sure an observer was of what it saw, in its own word."""
+    """Certainty of an observer, in its own word."""
 
     CERTAIN = "certain"
     LIKELY = "likely"
@@ -23,22 +23,22 @@ class Confidence(StrEnum):
 class Landmark:
     """A thing seen from a waypoint. Only the label is always known.
 
-    It has the pose, the time and the picture of its own waypoint where it does not say otherwise
-    (`Waypoint.pose_of`, `Waypoint.dated`), and always its map and the room it was seen from.
+    Pose, time and picture default to those of its waypoint (`Waypoint.pose_of`, `Waypoint.dated`);
+    its map and the room it was seen from are always the waypoint's.
 
     Attributes:
         bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
         range_m: Its distance from that pose.
-        range_from: What measured that; None where the observer judged it.
+        range_from: The sensor that measured it; None if the observer estimated it.
         bearing_from: What its direction was measured in, such as a picture; None where the observer
             judged it.
         picture: The picture it was seen in, by its relative name, if not the waypoint's.
         stamp_s: Robot time it was last seen at, if not the waypoint's.
-        recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
+        recorded_at: The same as calendar time with time zone, if not the waypoint's.
         pose: The pose it was seen from, in the map frame, if not the waypoint's.
-        laser: What the robot's laser met around that direction, from that pose.
-        n_missed: Looks since it was last seen, from that place, that should have shown it.
-        is_gone: It is not there any more, or is to be forgotten; kept so that this can be undone.
+        laser: Laser ranges around that direction, from that pose.
+        n_missed: Number of later looks from that place that should have shown it.
+        is_gone: It is no longer there, or was forgotten; kept so that this can be undone.
 
     Raises:
         SemanticMapError: The label is empty.
@@ -160,7 +160,7 @@ class Waypoint:
         return tuple(each for each in landmarks if self.pose_of(each) == pose)
 
     def dated(self, landmark: Landmark) -> Landmark:
-        """Return one of its landmarks with the time and picture that it has from this waypoint.
+        """Return one of its landmarks with its effective time and picture.
 
         A landmark with a time of its own was last seen in an earlier picture, if in any.
         """
@@ -180,10 +180,10 @@ class SemanticMap:
 
     Attributes:
         frames: Those that records name.
-        elsewhere: Places of frames of which it is not known how they lie to the robot's map.
-        n_events_elsewhere: How many events are left out for the same reason.
-        warnings: What its reader should know: another map's places, a file that is broken by now,
-            a key that looks misspelt.
+        elsewhere: Places of frames of unknown alignment with the robot's map.
+        n_events_elsewhere: Number of events left out for the same reason.
+        warnings: For the reader: places of another map, a file broken since, a key that looks
+            misspelt.
     """
 
     map_id: str | None = None

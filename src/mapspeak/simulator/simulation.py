@@ -1,4 +1,4 @@
-"""A world with one robot, stepped by hand: what its robot knows, and apart from it the truth.
+"""A world with one robot, stepped by hand: the robot's knowledge and, apart from it, the truth.
 
 Each step is one tick of 0.05 s of robot time: navigation commands a velocity, the body moves, the
 wheels report, and at every second tick the LiDAR measures and SLAM learns.
@@ -41,14 +41,14 @@ class Simulation:
     """One world and its robot.
 
     Attributes:
-        truth: What no robot may know; for scoring alone.
-        equipment: What the robot can do besides driving.
+        truth: Hidden from the robot; for scoring alone.
+        equipment: The robot's skills besides driving.
 
     Args:
-        seed: Of all noise; the same seed and the same commands give the same run.
+        seed: For all noise; the same seed and commands give the same run.
         known: A finished map of the world, whose frame starts at the world's start; the robot finds
             its place in it instead of making one.
-        start: Where the robot stands at first, in the world's own frame; None for the world's own.
+        start: The robot's first pose, in the world's own frame; None for the world's own start.
             Without a known map, the map frame starts there.
     """
 
@@ -102,22 +102,22 @@ class Simulation:
 
     @property
     def world_name(self) -> str:
-        """Where the robot drives, by name."""
+        """Name of the world."""
         return self._world.name
 
     @property
     def pose_in_map(self) -> Pose:
-        """Where the robot believes it is, by SLAM."""
+        """The robot's pose by SLAM."""
         return self._mapper.map_from_base
 
     @property
     def odom_from_base(self) -> Pose:
-        """Where the wheels alone say it is."""
+        """The robot's pose by odometry alone."""
         return self._odometry.odom_from_base
 
     @property
     def velocity(self) -> BodyVelocity:
-        """How fast the wheels turn it."""
+        """Velocity by the wheels."""
         return self._body.velocity
 
     @property
@@ -127,7 +127,7 @@ class Simulation:
 
     @property
     def pose_of_scan(self) -> Pose:
-        """Where SLAM takes the robot to have been in the map at that turn."""
+        """The robot's pose in the map at that scan, by SLAM."""
         return self.pose_in_map @ self._now_from_scan
 
     def map(self) -> OccupancyGrid:
@@ -158,7 +158,7 @@ class Simulation:
         return self._goal_id
 
     def goal_status(self, goal_id: int) -> GoalStatus:
-        """Return how a drive stands, also after it has ended.
+        """Return the status of a drive, also after it has ended.
 
         Raises:
             GoalError: No drive has that id.
@@ -192,7 +192,7 @@ class Simulation:
         return PinholeCamera(self._world)
 
     def _change(self, world: World) -> None:
-        """Let something be elsewhere: sensors, body and camera meet the world as it is now."""
+        """Replace the world for sensors, body and camera."""
         self._world = world
         solids = slice_world(world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
         self._lidar.stand_among(solids)
@@ -231,12 +231,12 @@ STATE_PERIOD_S = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateRecord:
-    """How a simulation truly stood at one moment.
+    """True state of a simulation at one moment.
 
     Attributes:
         x: Metres, in a map without errors.
-        slam_error_m: How far the robot's own pose was off.
-        deeds: What its skills have done so far, in order.
+        slam_error_m: Error of the robot's own pose.
+        deeds: Actions of its skills so far, in order.
     """
 
     time_s: float
@@ -251,12 +251,12 @@ class StateRecord:
 
     @property
     def pose(self) -> Pose:
-        """Where the robot truly stood."""
+        """The robot's true pose."""
         return Pose(self.x, self.y, self.yaw_rad)
 
     @classmethod
     def of(cls, simulation: Simulation) -> Self:
-        """Return how a simulation truly stands now."""
+        """Return the present true state of a simulation."""
         truth = simulation.truth
         pose = truth.pose
         return cls(

@@ -1,4 +1,4 @@
-"""What is true of a simulation and no robot may know: for scoring alone.
+"""The truth about a simulation, hidden from the robot: for scoring alone.
 
 Cells of truth grids lie in the map frame, which starts where the robot starts, and share their
 borders with the cells of the robot's own map.
@@ -102,7 +102,7 @@ class TrueFloor:
 
     @cached_property
     def visible(self) -> OccupancyGrid:
-        """What a perfect robot could map: 0 free floor that it can see, 100 solid, else -1.
+        """The map of a perfect robot: 0 free floor that it can see, 100 solid, else -1.
 
         As on every map made by a LiDAR, a cell that a surface touches is solid.
         """
@@ -149,7 +149,7 @@ class TrueFloor:
 
 
 class Truth:
-    """How a running simulation truly stands."""
+    """True state of a running simulation."""
 
     def __init__(self, world: World, body: RobotBody, mapper: Mapper | Localiser) -> None:
         self.world = world
@@ -169,17 +169,17 @@ class Truth:
 
     @property
     def slam_error_m(self) -> float:
-        """How far the robot's own pose is off."""
+        """Error of the robot's own pose."""
         return self.pose.point.distance_to(self._mapper.map_from_base.point)
 
     @property
     def n_collisions(self) -> int:
-        """How often the robot has bumped into something."""
+        """Number of collisions so far."""
         return self._body.n_collisions
 
     @property
     def driven_m(self) -> float:
-        """How far the robot has driven."""
+        """Distance driven so far."""
         return self._body.driven_m
 
 
@@ -190,7 +190,7 @@ def _grid(cells: NDArray[np.integer[Any]], origin: Point) -> OccupancyGrid:
 
 
 EYE_BAND_M = (1.05, 1.15)
-"""What is as high as the camera hides what lies behind it."""
+"""Obstacles as high as the camera, which hide what lies behind them."""
 OWN_SIZE_M = 0.5
 """The thing itself, and the wall it hangs on, do not hide it."""
 SIDEWAYS_M = (-0.2, -0.1, 0.0, 0.1, 0.2)
@@ -205,15 +205,15 @@ def slice_at_eye_level(world: World) -> Slice:
 def is_in_sight(
     world: World, place: Point, thing: WorldObject, *, hiding: Slice | None = None
 ) -> bool:
-    """Return True when nothing as high as the camera hides all of a thing from a place.
+    """Return True unless obstacles as high as the camera hide all of a thing from a place.
 
     What hangs on a wall is hidden from everywhere behind that wall.
 
     Args:
-        world: With the thing.
+        world: The world that holds the thing.
         place: In the world's own frame.
-        thing: Which one.
-        hiding: The world at eye level, where it is at hand; else it is cut anew.
+        thing: The thing looked for.
+        hiding: The world sliced at eye level, if available; else it is sliced here.
     """
     if find_kind(thing.kind).is_wall_hung and thing.pose.inverse().transform(place).x <= 0:
         return False

@@ -1,4 +1,4 @@
-"""How much of a building a map shows: by the paper's ratio, by place, and without a reference."""
+"""Coverage of a building by a map: by the paper's ratio, by place, and without a reference."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class Coverage:
     """A map compared with a reference of the same frame, both judged by their free floor.
 
     Attributes:
-        paper_ratio: Free area of the map over free area of the reference, wherever it lies; can
+        paper_ratio: Free area of the map over free area of the reference, regardless of place; can
             exceed 1.
         recall: Share of the reference's free floor that is free on the map.
         precision: Share of the map's free floor that is free in the reference; 1 for a map that
@@ -31,7 +31,7 @@ class Coverage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownArea:
-    """What a map shows, with nothing to compare it with.
+    """Coverage of a map without a reference.
 
     Attributes:
         known_ratio: Share of the array that is free or occupied.
@@ -50,14 +50,14 @@ def measure_coverage(
 ) -> Coverage:
     """Compare the free floor of a map with that of a reference.
 
-    The two may differ in origin, size, yaw and resolution: each cell is looked up in the other
-    map by the place of its middle.
+    The two may differ in origin, size, yaw and resolution: each cell is looked up in the other map
+    by the position of its centre.
 
     Args:
         grid: The map to judge.
         reference: A complete map of the same building, in the same frame.
-        reachable: Which cells of the reference count, such as those a robot can come to or see;
-            None for all that are free.
+        reachable: The cells of the reference that count, such as those a robot can reach or see;
+            None for all free cells.
 
     Raises:
         MapError: The mask has another shape, or no cell of the reference counts.
@@ -112,7 +112,7 @@ def _share_found(
 
 
 def _count_open_sides(grid: OccupancyGrid) -> int:
-    """Return how many sides of free cells have an unknown cell, or no cell, behind them."""
+    """Return the number of sides of free cells that face an unknown cell or no cell."""
     free = np.pad(grid.free, 1)
     unknown = np.pad(grid.unknown, 1, constant_values=True)
     along_rows = (free[:-1] & unknown[1:]) | (unknown[:-1] & free[1:])

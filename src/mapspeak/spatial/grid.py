@@ -41,7 +41,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class OccupancyGrid:
-    """What the robot knows about which places are free; compared by identity.
+    """An occupancy grid; compared by identity.
 
     Attributes:
         cells: int8, shape (rows, cols): -1 unknown, 0..100 the probability of being occupied.
@@ -94,7 +94,7 @@ class OccupancyGrid:
 
     @property
     def occupied(self) -> Mask:
-        """True where something stands: occupancy 50 to 100."""
+        """True where an obstacle is: occupancy 50 to 100."""
         return self._mask("occupied", lambda: self.cells > FREE_MAX)
 
     @property
@@ -114,7 +114,7 @@ class OccupancyGrid:
         return self.contains(cell) and 0 <= int(self.cells[cell.row, cell.col]) <= FREE_MAX
 
     def is_occupied(self, cell: Cell) -> bool:
-        """Return True where something stands; never outside the array."""
+        """Return True where an obstacle is; never outside the array."""
         return self.contains(cell) and int(self.cells[cell.row, cell.col]) > FREE_MAX
 
     def is_unknown(self, cell: Cell) -> bool:
@@ -122,10 +122,10 @@ class OccupancyGrid:
         return not self.contains(cell) or int(self.cells[cell.row, cell.col]) < 0
 
     def find_barred(self, start: Point) -> Mask | None:  # noqa: ARG002 - of the map itself, none
-        """Find the cells that no way from a place may pass; None where there are no such cells.
+        """Find the cells that no way from a place may pass; None if there are none.
 
-        Walls are not among them: where a pose or a map is off, a robot may seem to stand in a wall.
-        What people have closed is, however wrong the pose may be.
+        Walls are excluded: with an error of pose or map, a robot may seem to stand in a wall. Areas
+        that people closed are included, whatever the error of the pose.
         """
         return None
 
@@ -148,18 +148,18 @@ class OccupancyGrid:
         return np.asarray((rows >= 0) & (rows < self.n_rows) & (cols >= 0) & (cols < self.n_cols))
 
     def window(self, rows: IntArray | int, cols: IntArray | int, *, margin: int) -> Window:
-        """Return the part of the array around some cells, with a margin of so many cells."""
+        """Return the part of the array around some cells, with a margin in cells."""
         return _span(rows, margin, self.n_rows), _span(cols, margin, self.n_cols)
 
     def window_around(self, point: Point, reach_m: float) -> Window:
-        """Return the part of the array that holds all cells at most so far from a point."""
+        """Return the part of the array that holds all cells within a distance of a point."""
         cell = self.cell_at(point)
         return self.window(cell.row, cell.col, margin=math.ceil(reach_m / self.resolution_m))
 
     def look_up(
         self, values: NDArray[_Scalar], points: FloatArray, *, outside: float
     ) -> NDArray[_Scalar]:
-        """Return the values of the cells that points fall in, and another outside the array.
+        """Return the values of the cells that points fall in, and a default outside the array.
 
         Args:
             values: One for each cell of the grid.
@@ -228,7 +228,7 @@ def _span(places: IntArray | int, margin: int, size: int) -> slice:
 
 
 def _is_immutable(cells: NDArray[np.integer[Any]]) -> bool:
-    """Return True for what lies in a `bytes`, as a map from a wire does: no copy is needed."""
+    """Return True for an array backed by `bytes`, as from a connection: it needs no copy."""
     owner: object = cells
     if not (isinstance(owner, np.ndarray) and owner.dtype == np.int8 and owner.flags.c_contiguous):
         return False

@@ -41,7 +41,7 @@ _SWITCHES = {"0": False, "false": False, "no": False, "1": True, "true": True, "
 
 
 class MapMode(StrEnum):
-    """How the greys of a map's picture stand for occupancy.
+    """Encoding of occupancy in the greys of a map's picture.
 
     Trinary: free, occupied or unknown. Scale: the same, and between the thresholds a probability.
     Raw: the grey itself is the occupancy, and anything above 100 is unknown.
@@ -53,7 +53,7 @@ class MapMode(StrEnum):
 
 
 class MapOddity(StrEnum):
-    """What makes a map file load, but hardly as its maker meant it."""
+    """Kinds of doubts about a map file that loads, but hardly as its maker meant."""
 
     UNKNOWN_IS_FREE = "unknown_is_free"
     CROSSED_THRESHOLDS = "crossed_thresholds"
@@ -63,11 +63,11 @@ class MapOddity(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapFileWarning:
-    """Something in a map file that deserves a second look.
+    """A doubt about a map file.
 
     Attributes:
-        n_cells: Cells that have the grey of unknown, and load as free.
-        picture: The file that was read in place of the one that is named and not there.
+        n_cells: Number of cells with the grey of unknown that load as free.
+        picture: The file that was read instead of the missing one that is named.
     """
 
     oddity: MapOddity
@@ -105,14 +105,14 @@ class _Description:
 
 
 def load_map(path: Path, *, is_grey_unknown: bool = False) -> LoadedMap:
-    """Read a map_server .yaml and the picture it names, or one beside it where that is not there.
+    """Read a map_server .yaml and the picture it names, or one beside it if that is missing.
 
     Args:
         path: The .yaml.
-        is_grey_unknown: Takes the grey 205 for unknown, whatever threshold the .yaml has for free.
+        is_grey_unknown: Treats the grey 205 as unknown, whatever the .yaml's threshold for free.
 
     Raises:
-        MapError: A file is missing, damaged, too large, or says what cannot be.
+        MapError: A file is missing, damaged, too large, or has an impossible value.
     """
     description = _read_description(path)
     if is_grey_unknown:
@@ -127,7 +127,7 @@ def load_map(path: Path, *, is_grey_unknown: bool = False) -> LoadedMap:
 
 
 def find_picture(description: Path, image: str) -> Path:
-    """Return the picture that a .yaml names; where there is none, one of that name beside it.
+    """Return the picture that a .yaml names; if missing, one of that name beside it.
 
     Maps that were copied from another machine often name a path of that machine.
     """
@@ -259,7 +259,7 @@ _KEYS: dict[str, tuple[Callable[[Any], object], str]] = {
     "negate": (lambda said: _SWITCHES[str(said).lower()], "negate: 0"),
     "mode": (lambda said: MapMode(str(said).lower()), "mode: trinary"),
 }
-"""How each key of the .yaml is read, and an example of its line."""
+"""Parser and example line for each key of the .yaml."""
 
 
 def _parse_yaml(path: Path) -> CommentedMap:

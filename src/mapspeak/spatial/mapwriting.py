@@ -78,7 +78,7 @@ def _grey_of_occupancy(mode: MapMode) -> Grey:
 
 
 def _save_description(grid: OccupancyGrid, path: Path, image: str, mode: MapMode) -> None:
-    """Write the .yaml; in scale mode with thresholds that leave every value as it is."""
+    """Write the .yaml; in scale mode with thresholds that preserve every value."""
     origin = CommentedSeq(float(v) for v in (grid.origin.x, grid.origin.y, grid.origin.yaw_rad))
     origin.fa.set_flow_style()
     is_scale = mode is MapMode.SCALE

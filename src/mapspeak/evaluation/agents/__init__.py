@@ -1,1 +1,1 @@
-"""Agents: whoever carries out an assignment by calling tools."""
+"""Agents, which carry out assignments by calling tools."""

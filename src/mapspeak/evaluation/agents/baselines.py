@@ -112,16 +112,16 @@ MOST_GOALS = 120
 FARTHEST_MISS_M = 0.5
 """Two goals that lie nearer to each other are the same one."""
 STEP_M = 5.0
-"""The paper's prompt asks for waypoints at least so far away, ..."""
+"""The paper's prompt asks for waypoints at least this far away, ..."""
 BACK_M = 3.0
-"""... and for none so near to one that was visited."""
+"""... and not this near to a visited one."""
 LEAST_EDGE_M = 0.6
 """A border with the unknown that is shorter is a crack."""
 DOOR_M = 1.2
 """Free floor no wider counts as a doorway when rooms are told apart by eye."""
 LEAST_ROOM_M2 = 1.0
 SIGHT_M = 4.0
-"""How far a border counts as seen: beyond it is seen, but small."""
+"""A border counts as seen up to this distance; beyond, it looks small."""
 MARGIN_M = 0.45
 """A goal keeps this clear of walls: as much as the robot needs and a little more."""
 
@@ -135,9 +135,9 @@ async def _record(driver: ToolDriver) -> Pose:
 
 
 async def explore_nearest_frontiers(task: Assignment, tools: ToolClient) -> AgentEnd:
-    """Drive to the frontier with the shortest way, until there is none: the plain baseline.
+    """Drive to the frontier with the shortest way, until none is left: the plain baseline.
 
-    It only explores; asked for anything else it gives up.
+    It only explores, and gives up on any other task.
     """
     if not task.prompt.startswith(EXPLORING):
         return gave_up("I only explore.")
@@ -198,7 +198,7 @@ async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
 
 
 async def _see_map(driver: ToolDriver) -> OccupancyGrid:
-    """Look at all three of the paper's pictures, and read the first as it is drawn."""
+    """Look at all three of the paper's pictures, and read the first."""
     plain = await driver.tools.demand("subscribe_map_as_image")
     await driver.tools.demand("draw_map_axis")
     await driver.tools.demand("draw_robot_pose")
@@ -210,7 +210,7 @@ def _choose_waypoint(
 ) -> Pose | None:
     """Find the place that sees most of the border with the unknown, by the prompt's rules.
 
-    A place at least 5 m away comes first; where there is none, one that is nearer.
+    A place at least 5 m away is preferred to a nearer one.
     """
     # Free cells beside unknown ones.
     edge = grid.free & (cv2.dilate(grid.unknown.view(np.uint8), np.ones((3, 3), np.uint8)) > 0)

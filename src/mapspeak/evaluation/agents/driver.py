@@ -1,7 +1,7 @@
-"""What scripts do over and over: read what tools answer as a model does, recall, drive to the end.
+"""Steps that scripts share: read tool answers as a model does, recall, drive to the end.
 
-A language model looks at the picture itself. A script cannot, so it reads what the robot's detector
-(in the simulator: the *simulated detector*) reports, and sorts it by the paper's filtering policy.
+A language model looks at the picture itself. A script cannot, so it reads the reports of the
+robot's detector (in the simulator: the *simulated detector*), filtered by the paper's policy.
 """
 
 import io
@@ -37,7 +37,7 @@ class Row:
     cells: dict[str, str]
 
     def number(self, column: str) -> float:
-        """Return a column as a number; infinite where the table says there is none."""
+        """Return a column as a number; infinite if the table has no value."""
         match = re.match(r"-?[\d.]+", self.cells[column])
         return float(match.group()) if match else math.inf
 
@@ -49,7 +49,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapReading:
-    """What the text of `look_at_map` says.
+    """Content of the text of `look_at_map`.
 
     Attributes:
         tables: Rows by the name of their table: Rooms, Doors, Frontiers, Places.
@@ -177,11 +177,11 @@ REFUSED = "refused"
 
 @dataclass(slots=True)
 class ToolDriver:
-    """Calls tools in a script's name.
+    """Calls tools for a script.
 
     Attributes:
-        wait_s: How long each call waits for the end of a drive, in robot time.
-        sight_m: How far it takes note of what the detector reports; 0 for a blind one.
+        wait_s: Longest wait of each call for the end of a drive, in robot time.
+        sight_m: Range up to which it uses the detector's reports; 0 for a blind one.
     """
 
     tools: ToolClient
@@ -234,7 +234,7 @@ class ToolDriver:
         return REFUSED if answer.is_error else str(answer.report["state"])
 
     async def find_region(self, point: Point) -> str:
-        """Return the id of the room, corridor or hall at a point; empty where there is none."""
+        """Return the id of the room, corridor or hall at a point; empty without one."""
         place = f"{point.x:.2f}, {point.y:.2f}"
         text = (await self.tools.demand("describe_place", place=place)).text
         # The first answer of a session says first what is remembered.

@@ -1,4 +1,4 @@
-"""How the scripted policy does a composed errand: it reads it into a mission, and has that run."""
+"""Composed errands of the scripted policy: parse them into a mission and run it."""
 
 import io
 import re
@@ -25,10 +25,10 @@ DOCK = "nearest charging dock"
 
 
 async def do_errand(driver: ToolDriver, errand: str, search: Search) -> AgentEnd:
-    """Run an errand as one mission, and say how that ended.
+    """Run an errand as one mission, and return how that ended.
 
     Args:
-        search: Finds a thing that is not remembered, and drives up to it.
+        search: Finds a thing that is not remembered, and drives to it.
     """
     steps: list[Any] = []
     if low := LOW.search(errand):

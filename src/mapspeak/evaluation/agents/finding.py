@@ -25,11 +25,11 @@ from mapspeak.installation import say_install
 ORACLE, MOCK = "oracle", "mock"
 COMMAND = "command:"
 NEAR_SIGHT_M = 2.0
-"""So far sees the script whose eyes are not sharp; things are seen from three times as far."""
+"""Range of sight of the near-sighted script; things are visible from three times as far."""
 CLIENT = "openai"
-"""The package that inspect-ai speaks through where there is no other; the extra brings it."""
+"""The default package for inspect-ai's requests; the extra installs it."""
 CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
-"""Packages that it speaks through to other providers."""
+"""Packages for requests to other providers."""
 SCRIPTS: dict[str, Work] = {
     "scripted": follow_script,
     "near-sighted": partial(follow_script, sight_m=NEAR_SIGHT_M),
@@ -52,10 +52,10 @@ def is_script(answerer: str) -> bool:
 
 
 def check_agent(name: str, thinking: str | None = None) -> None:
-    """Check that an agent exists and has all that it needs, without asking it anything.
+    """Check that an agent exists and has all requirements, without asking it anything.
 
     Raises:
-        ConfigError: There is no such agent, or something that it needs is missing.
+        ConfigError: There is no such agent, or a requirement is missing.
     """
     if name != ORACLE:
         find_agent(name, thinking)
@@ -68,12 +68,12 @@ def find_agent(
 
     Args:
         name: One of `agent_names`, "PROVIDER/MODEL" or "command:PROGRAM".
-        thinking: How much a model may think, as `Thinking`; None where nothing was said.
-        truth: For the oracle alone: the trial's setting, and the world as it is set.
+        thinking: Level of thinking of a model, as `Thinking`; None if not set.
+        truth: For the oracle alone: the trial's setting and its world.
 
     Raises:
-        ConfigError: There is none, the model or program cannot be had, or there is no such way to
-            think.
+        ConfigError: There is no such agent or level of thinking, or the model or program is
+            unavailable.
     """
     amount = read_thinking(thinking)
     if name == ORACLE and truth is not None:
@@ -128,10 +128,10 @@ def _find_client(name: str) -> str:
 
 
 def find_versions(names: Iterable[str]) -> dict[str, str]:
-    """Return the versions of what stands behind some agents, each by its own name.
+    """Return the versions of the software behind some agents, by name.
 
-    It is `inspect-ai` and the provider's own package behind models, and a client program behind
-    "command:PROGRAM"; what does not say its version is left out.
+    For models these are `inspect-ai` and the provider's package, for "command:PROGRAM" the client
+    program; software without a version is left out.
     """
     versions: dict[str, str] = {}
     for name in names:
@@ -147,10 +147,10 @@ def find_versions(names: Iterable[str]) -> dict[str, str]:
 
 
 def read_thinking(thinking: str | None) -> Thinking | None:
-    """Return how much a model may think; None where nothing was said.
+    """Return the level of thinking of a model; None if not set.
 
     Raises:
-        ConfigError: There is no such way to think.
+        ConfigError: There is no such level.
     """
     if thinking is None:
         return None

@@ -46,7 +46,7 @@ async def follow_script(
     """Read the prompt by its words and do what fits.
 
     Args:
-        sight_m: How far it takes note of what the detector reports; it reads all text.
+        sight_m: Range up to which it uses the detector's reports; it reads all text.
     """
     driver = ToolDriver(tools, sight_m=sight_m)
     try:

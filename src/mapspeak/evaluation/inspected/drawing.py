@@ -19,7 +19,7 @@ from mapspeak.ros.messages.poses import FrameTransform
 from mapspeak.spatial import OccupancyGrid
 
 Names = SimpleNamespace
-"""What the parts of one robot's ROS are called."""
+"""Names of the parts of one robot's ROS."""
 TRANSFORMS = "tf2_msgs/TFMessage"
 FIRST_S, LAST_S = 1_700_000_000, 1_760_000_000
 """Robots that run by the time of day have such clocks."""

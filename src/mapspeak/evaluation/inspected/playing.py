@@ -24,15 +24,15 @@ from mapspeak.rosbridge_server import (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stream:
-    """What one node publishes on one topic; types are written as "package/Type".
+    """A publisher of one node on one topic; types are written as "package/Type".
 
     Attributes:
-        values: The fields of each message, but for those with their defaults.
-        frame_id: Of the header that is written with each stamp; None for a message without one.
-        transforms: What tf messages carry, in place of `values`; each message has its own stamp.
-        rate_hz: Messages in a second of the wall clock; 0 for a stream that has died, None for one
-            message, which is kept for all who come later.
-        lag_s: How far its stamps lie behind the robot's clock.
+        values: The fields of each message that differ from their defaults.
+        frame_id: Of the header with each stamp; None for a message without a header.
+        transforms: Content of tf messages, in place of `values`; each has its own stamp.
+        rate_hz: Messages per second of the wall clock; 0 for a dead stream, None for one latched
+            message.
+        lag_s: Lag of its stamps behind the robot's clock.
     """
 
     node: str
@@ -70,14 +70,14 @@ class OfferedService:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InspectedSystem:
-    """All that the robot's ROS consists of.
+    """The whole ROS graph of the robot.
 
     Attributes:
-        started_s: The robot's clock in the beginning.
+        started_s: The robot's clock at the beginning.
         subscriptions: The topics that each node subscribes to, with the types that it expects.
-        services: What is offered, besides what every ROS offers.
+        services: Offered services, besides those of every ROS.
         parameters: Values by nodes and their own names; each node is named here.
-        types: The texts of types that no ROS comes with, by "package/Type".
+        types: The definitions of custom types, by "package/Type".
     """
 
     dialect: Dialect

@@ -33,8 +33,8 @@ PAPER_NOTE = (
 
 PAPER_TRIALS = 30
 PAPER_ROWS = (("Claude Sonnet 4.6", 0.9783, 26, 30), ("GPT-5.5", 0.9978, 28, 30))
-"""What the paper printed of each model: the coverage of one run of Task 1 by its own ratio, and how
-many of thirty trials of Task 2 and of Task 3 were done."""
+"""Results of each model in the paper: the coverage of one run of Task 1 by its own ratio, and the
+number of thirty trials of Task 2 and of Task 3 that succeeded."""
 
 
 def write_page(run: Path, results: Sequence[TrialResult]) -> Path:

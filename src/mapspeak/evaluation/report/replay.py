@@ -87,7 +87,7 @@ class ReplayWriter:
 
 
 def say_standing(result: TrialResult) -> tuple[str, str]:
-    """Return in a word how a trial ended, and of what kind that is."""
+    """Return a word for the end of a trial, and its kind."""
     if result.state.is_broken:
         return result.state.value, "broken"
     return ("done", "good") if result.score.is_success else ("not done", "bad")

@@ -1,1 +1,1 @@
-"""Runs: many trials, each in a process of its own, and one run that can be taken up again."""
+"""Runs of many trials, each in its own process; a run can be resumed."""

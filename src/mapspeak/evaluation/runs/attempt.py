@@ -126,14 +126,14 @@ def attempt(
     view: str | None = None,
     on_turn: Callable[[Turn], None] | None = None,
 ) -> TrialResult:
-    """Carry out a trial, write everything about it, its result last, and return that.
+    """Carry out a trial, write all its records, the result last, and return the result.
 
     Args:
-        preparation: The trial whose map and memory this one starts from; None where there is none.
-        connection: How the agent reaches the server; None for the way that the agent prefers.
+        preparation: The trial whose map and memory this one starts from; None without one.
+        connection: Of the agent to the server; None for the kind that the agent prefers.
         control: Where the robot is held and released; None for a folder of the trial.
-        view: Address of a live page of a server that runs as a program; None for no page.
-        on_turn: Told of each piece of the conversation, a call before it is made.
+        view: Address of a live page, if the server runs as a program; None for no page.
+        on_turn: Called with each piece of the conversation, with a call before it is made.
     """
     begun_cpu_s = time.process_time()
     # Trials share the machine: one thread each costs least.

@@ -18,7 +18,7 @@ from mapspeak.evaluation.trials import PICTURES, Trial, TrialResult, Turn, read_
 LOG = "inspect.eval"
 SCORER = "truth"
 RIGHT, WRONG = "C", "I"
-"""How inspect-ai writes a score of right and of wrong."""
+"""Scores of inspect-ai for right and wrong."""
 
 
 def write_log(

@@ -1,4 +1,4 @@
-"""What an evaluation is to run: its options, its trials, and what has to go before them."""
+"""Plan of an evaluation: its options, its trials and their preparations."""
 
 import platform
 from collections.abc import Iterable, Iterator, Mapping
@@ -25,19 +25,19 @@ SCRIPTED = "scripted"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """What an evaluation was asked for.
+    """Options of an evaluation.
 
     Attributes:
         tasks: Names of tasks or of their groups.
-        worlds: Names, paths, or "all" for those that are shipped.
-        n_trials: Of each task in each world; a world is explored once.
-        seed: The first trial's; each further one has the next.
-        thinking: How much models may think; None where nothing was said. Scripts are asked once.
+        worlds: Names, paths, or "all" for the shipped ones.
+        n_trials: Per task and world; a world is explored once.
+        seed: Of the first trial; each further one has the next.
+        thinking: Level of thinking of models; None if not set. Scripts run once.
         hang_s: Wall time after which a trial's process is killed.
-        has_retry: Trials that crashed or hung before are run again.
+        has_retry: Run trials again that crashed or hung.
 
     Raises:
-        ConfigError: There is no such representation or way to think, or nothing was chosen.
+        ConfigError: There is no such representation or level of thinking, or nothing was chosen.
     """
 
     agents: tuple[str, ...] = (SCRIPTED,)
@@ -77,7 +77,7 @@ class RunOptions:
                 )
 
     def load_worlds(self) -> dict[str, World]:
-        """Return the worlds by the names they were asked for.
+        """Return the worlds by their requested names.
 
         Raises:
             ConfigError: There is no such world.
@@ -91,9 +91,9 @@ class RunPlan:
     """The trials of an evaluation.
 
     Attributes:
-        trials: Those that were asked for, in their order.
-        preparations: Scripted explorations that others start from and that were not asked for.
-        versions: Of mapspeak, Python, numpy, and of what stands behind the agents, by name.
+        trials: The requested trials in order.
+        preparations: Scripted explorations that others start from, not requested themselves.
+        versions: Of mapspeak, Python, numpy and the agents' software, by name.
     """
 
     trials: tuple[Trial, ...]
@@ -102,11 +102,10 @@ class RunPlan:
 
 
 def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
-    """Plan all trials of an evaluation, world by world, and what has to go before them.
+    """Plan all trials of an evaluation, world by world, and their preparations.
 
     Raises:
-        ConfigError: There is no such task, no world offers it, or two trials would lie in one
-            folder.
+        ConfigError: There is no such task, no world offers it, or two trials would share a folder.
     """
     tasks = choose_tasks(options.tasks)
     trials: list[Trial] = []

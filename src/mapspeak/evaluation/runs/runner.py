@@ -50,8 +50,8 @@ PRELOAD = (
     *("mapspeak.evaluation.runs.runner", "mapspeak.cli", "PIL.Image", "anyio._backends._asyncio"),
     *("jsonschema", "mcp.client.stdio", "numpy.fft", "numpy.ma", "rich.logging", "ruamel.yaml"),
 )
-"""What every trial needs, also what others import only when they first need it: imported once,
-before processes are forked."""
+"""Modules that every trial needs, even those imported lazily elsewhere: imported once, before
+processes are forked."""
 LAST_WORDS = 2000
 """Characters of a crash that its result keeps."""
 FULL_DISK = 74
@@ -65,9 +65,9 @@ class TrialJob:
     """A trial to be run.
 
     Attributes:
-        work: Carries it out and writes its result; called in a process of its own.
-        after: A trial that has to be finished before; None for none.
-        wall_s: A process that takes longer is killed.
+        work: Carries it out and writes its result; called in its own process.
+        after: A trial that must finish before; None for none.
+        wall_s: Time after which its process is killed.
     """
 
     trial: Trial
@@ -329,7 +329,7 @@ def _write_broken(run: Path, job: TrialJob, state: TrialState, error: str) -> Tr
 
 def _work_apart(work: Callable[[], object], errors: Path) -> None:
     """Do the work; what it says goes to a file, and it ends when the run does."""
-    # What was loaded stays for good: no collection has to go through it, nor copy its pages.
+    # Loaded objects stay: the garbage collector need not visit them and copy their pages.
     gc.freeze()
     if (parent := multiprocessing.parent_process()) is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
@@ -355,7 +355,7 @@ def _work_apart(work: Callable[[], object], errors: Path) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when the run's process is gone: nobody would read its result."""
+    """End this process when the run's process is gone, as its result would not be read."""
     wait([parent])
     os._exit(1)
 

@@ -37,9 +37,9 @@ SHOWN = {
 """Figures with their headings, short enough for a terminal of eighty columns."""
 BAR_WIDTH = 12
 EXPLORATION_S, TRIAL_S = 26.0, 1.0
-"""What a script's trials took of one core in the mean over all worlds, for the announcement."""
+"""Mean core time of a script's trials over all worlds, for the announcement."""
 SPARE_TEXT = Column(ratio=1, no_wrap=True, overflow="ellipsis")
-"""What does not fit is cut, and not the numbers before it."""
+"""This column is cut if space is short, not the numbers before it."""
 
 
 def announce(options: RunOptions, plan: RunPlan) -> str:

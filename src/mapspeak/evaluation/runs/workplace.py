@@ -34,21 +34,21 @@ ANSWER_WITHIN_S = 120.0
 AUDIT, CONTROL = "audit.jsonl", "control"
 SERVE = (sys.executable, "-m", "mapspeak", "serve")
 CLOCK_ZERO = datetime(2000, 1, 1, tzinfo=UTC)
-"""What the clock on the wall shows when a robot of a trial in memory begins."""
+"""Wall time at the start of a trial in memory."""
 LINE_BYTES = 2000
 """More than the last line of a state log has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialSetup:
-    """What robot and server of a trial are made from.
+    """Configuration of the robot and server of a trial.
 
     Attributes:
-        world: The world of the trial, without what the setting adds.
-        known_map: A finished map (.yaml) for the robot; None where it has none.
+        world: The world of the trial, without additions of the setting.
+        known_map: A finished map (.yaml) for the robot; None without one.
         folder: The trial's.
         control: Where the robot is held and released.
-        view: Address of a live page, where the server runs as a program; None for no page.
+        view: Address of a live page, if the server runs as a program; None for no page.
     """
 
     trial: Trial
@@ -195,10 +195,10 @@ async def _connect(
 
 
 def _build_guard(setup: TrialSetup, robot: SimulatedRobot) -> Guard:
-    """Return the guard that a served robot has when nobody wrote a policy.
+    """Return the guard of a served robot without a policy file.
 
-    Its clock is the robot's, so that a trial is the same whenever it is run. Nothing watches
-    between calls: nobody can hold a trial's robot, no area is closed, and no time passes then.
+    It uses the robot's clock, so that trials are reproducible. It does not monitor between calls: a
+    trial's robot cannot be held, no area is closed, and no time passes then.
     """
 
     def robot_clock() -> datetime:

@@ -1,4 +1,4 @@
-"""What is true of a world, as tasks and scores ask for it; in the map frame, metres.
+"""The truth about a world for tasks and scores; in the map frame, metres.
 
 The map frame starts at the world's own start. No agent but the oracle ever sees any of this.
 """
@@ -64,7 +64,7 @@ class GroundTruth:
     """One world's truth."""
 
     LOOK_EVERY_M = 0.2
-    """How far apart the places are that `seen_near` gives."""
+    """Spacing of the places that `seen_near` returns."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -81,10 +81,10 @@ class GroundTruth:
 
     @cached_property
     def drivable(self) -> Mask:
-        """True where the robot can come to stand by driving, from anywhere on the main floor.
+        """True where the robot can drive to from anywhere on the main floor.
 
-        On its way it keeps off everything that its LiDAR shows. What lies behind a gap without
-        room for that is out, and so is the half of the gap that is nearer to it.
+        On its way it keeps clear of everything that its LiDAR shows. Areas behind a gap too narrow
+        for that are excluded, with the nearer half of the gap.
         """
         is_wide = self.floor.standable & (clearance_m(self.grid) >= BODY_RADIUS_M + KEEP_OFF_M)
         n_pieces, labels, stats, _ = cv2.connectedComponentsWithStats(
@@ -107,7 +107,7 @@ class GroundTruth:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """What is solid, as cells of the map frame."""
+        """Solid cells, in the map frame."""
         return self.floor.solid
 
     @cached_property
@@ -120,7 +120,7 @@ class GroundTruth:
         return distances_from(self.grid, point, radius_m=PLAN_RADIUS_M)
 
     def shortest_to_any_m(self, start: Point, goal: Mask) -> float:
-        """Return the shortest way to the nearest of some cells; infinite where there is none."""
+        """Return the shortest way to the nearest of some cells; infinite without one."""
         rows, cols = np.nonzero(goal & self.drivable)
         if not rows.size:
             return math.inf

@@ -27,12 +27,12 @@ NOWHERE = StateRecord(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Evidence:
-    """How a trial truly went.
+    """The truth about a trial.
 
     Attributes:
-        states: The simulator's truth from begin to end; poses in a map without errors.
-        grid: The robot's map in the end; None where there is none.
-        memory: The semantic map in the end, as YAML; None where there is none.
+        states: The simulator's true states from begin to end; poses in a map without errors.
+        grid: The robot's final map; None without one.
+        memory: The final semantic map, as YAML; None without one.
     """
 
     states: tuple[StateRecord, ...]
@@ -45,7 +45,7 @@ class Evidence:
 
     @property
     def last(self) -> StateRecord:
-        """How the simulation stood in the end."""
+        """The final state of the simulation."""
         return self.states[-1] if self.states else NOWHERE
 
     @property
@@ -132,7 +132,7 @@ def verdict(reason: str, figures: dict[str, float], *, failure: Failure | None =
 
 
 def read_said(text: str) -> str | None:
-    """Read what the last line of the form says; None where there is none."""
+    """Read the last line of the form; None without one."""
     lines = [match["said"].strip() for match in LINE.finditer(text)]
     return lines[-1] if lines else None
 
@@ -218,7 +218,7 @@ def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -
 
 PICTURING = ("look_through_camera", "look_at", "look_around", "explore", "search_for")
 FACED_M, FACED_RAD = 1.5, math.radians(30.0)
-"""A robot that stands this near to a thing and turned to it so far has it right before it."""
+"""A robot faces a thing from within this distance and angle."""
 
 
 def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
@@ -266,7 +266,7 @@ def judge_view(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObje
 
 
 def judge_near(evidence: Evidence, goal: Point, *, within_m: float) -> Score:
-    """Judge whether the robot stands where it should, to so many metres."""
+    """Judge whether the robot is at its goal, within a tolerance in metres."""
     away_m = evidence.end.distance_to(goal)
     said = f"It stands {away_m:.2f} m from where it should."
     failure = None if away_m <= within_m else Failure.WRONG_PLACE

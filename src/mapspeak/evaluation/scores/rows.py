@@ -39,12 +39,12 @@ def wilson_interval(n_successes: int, n_trials: int) -> Interval | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableRow:
-    """What came of the trials of one kind.
+    """Results of the trials of one kind.
 
     Attributes:
-        agent: Who answered, with how much it may think where that was said.
-        n_broken: How many crashed or hung; they count as trials.
-        figures: Means of everything that scores and results hold, by name.
+        agent: The agent's name, with its level of thinking if set.
+        n_broken: Number that crashed or hung; they count as trials.
+        figures: Means of all figures of scores and results, by name.
     """
 
     task: str

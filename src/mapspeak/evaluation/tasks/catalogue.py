@@ -78,7 +78,7 @@ def find_task(name: str) -> Task:
     """Return a task by its name.
 
     Raises:
-        ConfigError: There is none of that name.
+        ConfigError: No task has that name.
     """
     if name not in _TASKS:
         known = ", ".join((*FAMILIES, *_TASKS))
@@ -87,10 +87,10 @@ def find_task(name: str) -> Task:
 
 
 def choose_tasks(names: Iterable[str]) -> tuple[Task, ...]:
-    """Return tasks by their own names and those of their groups, each once.
+    """Return tasks by the names of tasks or groups, each once.
 
     Raises:
-        ConfigError: There is none of a name.
+        ConfigError: A name is unknown.
     """
     chosen: dict[str, Task] = {}
     for name in names:

@@ -24,7 +24,7 @@ MOST_ROOMS = 3
 N_FAULTS = 2
 
 Step = dict[str, Any]
-"""What has to be done next: a deed as the state log has it, and where."""
+"""The next required step: an action in the state log's format, and its place."""
 
 
 def _say_at_thing(draw: Draw) -> tuple[str, Step]:
@@ -152,7 +152,7 @@ def judge_errand(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
     if len(done) > len(steps):
         said = f"It did more than it was asked: {done[n_right][0]}."
         return verdict(said, figures, failure=Failure.WRONG_ANSWER)
-    # Some of what was charged is spent on the way.
+    # Some of the charge is spent on the way.
     if charged and at_last < charged[0] - 0.02:
         said = f"The battery was at {100 * at_last:.0f} %."
         return verdict(said, figures, failure=Failure.INCOMPLETE)

@@ -32,11 +32,11 @@ THERE, UNREACHABLE = "there", "unreachable"
 LEAST_DETOUR = 1.2
 LIMITS = Limits(n_calls=80, robot_time_s=1200.0, wall_s=900.0)
 CRATE_M = 0.8
-"""How wide a crate is."""
+"""Width of a crate."""
 DOOR_REACH_M = 1.0
-"""How far from a door the middle of its passage may lie."""
+"""Largest distance from a door to the middle of its passage."""
 ROOM_LEFT_RATIO = 0.5
-"""A thing in the way leaves the robot at least so much of the room."""
+"""Least share of the room that stays reachable past a thing in the way."""
 
 
 def _draw_blocked_way(draw: Draw) -> Setting:

@@ -31,7 +31,7 @@ class AnswerPart:
     """One part of a right answer: a name, a type, a word, a size, a link or a number.
 
     Attributes:
-        tolerance: How far a number may be off, in its own unit; None where it is no number.
+        tolerance: Tolerance of a number, in its own unit; None if it is not a number.
     """
 
     said: str
@@ -87,7 +87,7 @@ COARSENINGS = (1, 2, 3, 4)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A robot as it was drawn, in good order, and the name of what is asked about it."""
+    """A robot as drawn, without faults, and the name of the question's subject."""
 
     name: str
     draw: Draw
@@ -155,7 +155,7 @@ def _judge(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
 
 
 def _coarsen(grid: OccupancyGrid, factor: int) -> OccupancyGrid:
-    """Return a map in cells so many times as wide; a cell holds the worst that was in it."""
+    """Return a map with cells a factor wider; each holds the highest value within it."""
     n_rows, n_cols = grid.n_rows // factor, grid.n_cols // factor
     blocks = grid.cells[: n_rows * factor, : n_cols * factor]
     return OccupancyGrid(

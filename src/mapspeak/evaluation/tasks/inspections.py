@@ -10,7 +10,7 @@ from mapspeak.ros.definitions.types import parse_definition
 
 OFF_BY = (0.4, 0.5, 2.0, 3.0)
 RATE_RATIO = 0.15
-"""So far a rate may be off that was counted over some seconds."""
+"""Tolerance of a rate counted over some seconds."""
 LAG_RATIO, LAG_S = 0.1, 1.5
 """A message and the time are asked for one after the other."""
 LATE_S = 5.0

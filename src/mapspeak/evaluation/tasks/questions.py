@@ -29,7 +29,7 @@ N_SAME = 3
 MOST_NEAR, MOST_FAR = 3, 2
 """Rooms to choose from: neighbours, and others."""
 ENOUGH_NEW_RATIO = 0.5
-"""A place to explore next is good when it shows half of what the best one would."""
+"""A place to explore next is good if its gain is at least this share of the best."""
 N_VIEWS = 60
 
 Question = tuple[str, dict[str, Any]]

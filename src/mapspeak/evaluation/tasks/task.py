@@ -1,4 +1,4 @@
-"""What a task is: how a question is drawn for a world, and how the answer is scored."""
+"""A task: draws a question for a world, and scores the answer."""
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +22,11 @@ _Item = TypeVar("_Item")
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """What a trial's setting is drawn from.
+    """Inputs for drawing a trial's setting.
 
     Attributes:
-        random: Of all draws: another for each task, world and seed.
-        memory: The semantic map that an exploration of the world has left, as YAML.
+        random: For all draws; different for each task, world and seed.
+        memory: The semantic map from an exploration of the world, as YAML.
     """
 
     site: GroundTruth
@@ -49,7 +49,7 @@ class Draw:
         return self.site.draw_pose(self.random, elsewhere if is_left else None)
 
     def shortest_m(self, start: Pose, right: Mask) -> float:
-        """Return the way to the nearest of some cells, as it is kept as truth."""
+        """Return the way to the nearest of some cells, in the format of the truth."""
         return round(self.site.shortest_to_any_m(start.point, right), 3)
 
     def setting(
@@ -108,5 +108,5 @@ def point_text(point: Point) -> str:
 
 
 def pair(point: Point) -> list[float]:
-    """Return a point as it is kept as truth."""
+    """Return a point in the format of the truth."""
     return [round(point.x, 2), round(point.y, 2)]

@@ -1,9 +1,9 @@
-"""Finds remembered places and things by their names, by what they mean, or by the words used.
+"""Find remembered places and things by name, by meaning or by words.
 
-A name comes first. For all else meanings are compared where there is a model, and only words where
-there is none: mixing the two found less than the model alone. Compared is what is said of a thing
-and, counting a little less, what is commonly known of such things. Only what is said makes an
-answer sure, and a kind of thing that is not remembered may be what is meant instead.
+An exact name comes first. Otherwise meanings are compared if there is a model, else words: mixing
+both found less than the model alone. Texts of the record and, with a little less weight, general
+knowledge of such things are compared. Only texts of the record make an answer sure, and a kind that
+is not remembered may be the one meant.
 """
 
 import math
@@ -47,10 +47,10 @@ WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, 
 
 _SAME_NAME, _SAME_WORDS, _SAME_WORDS_MISSPELT = 1.0, 0.99, 0.98
 _MOST_WITHOUT_NAME = 0.97
-"""How alike an entry and a request are whose words are the entry's name, and all others at most."""
+"""Similarity of a request with the words of the entry's name; the limit for all others."""
 
 _LEAST_NAME_LIKENESS = 0.75
-"""From there on a request with a misspelt word counts as the name it looks like.
+"""Similarity from which a request with a misspelt word counts as the name it resembles.
 
 Of the requests for tuning all misspelt names are at least .75 like the right ones, and all others
 with unknown words at most .69 like any.
@@ -59,14 +59,14 @@ with unknown words at most .69 like any.
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """A request, and how alike each entry is to it.
+    """A request, and its similarity to each entry.
 
     Attributes:
-        common: The same, as they stand in what is commonly known.
-        ratios: By all that is said and commonly known of the entry.
-        said_ratios: By what is said of it alone.
-        part_ratios: Where meanings were compared, by all that is said of any entry.
-        missing: A kind that is not remembered and may be meant, and how alike both are.
+        common: The same words, as found in general knowledge.
+        ratios: By the texts of the entry and general knowledge.
+        said_ratios: By the texts of the entry alone.
+        part_ratios: By all texts of any entry, if meanings were compared.
+        missing: A kind that is not remembered and may be meant, with its similarity.
     """
 
     request: str
@@ -84,12 +84,12 @@ class _Asked:
 
 
 class EntryIndex:
-    """All that is remembered, ready to be searched; built anew when anything changes.
+    """Search index of the memory; rebuilt when anything changes.
 
     Args:
-        entries: In any order, each with an id of its own.
-        vectors: What compares meanings; None where there is no model. Given again to the next
-            index, it embeds only the texts that are new.
+        entries: In any order, with unique ids.
+        vectors: Compares meanings; None without a model. When passed on to the next index, it
+            embeds only new texts.
     """
 
     def __init__(self, entries: Sequence[Entry], *, vectors: TextVectors | None = None) -> None:
@@ -99,7 +99,7 @@ class EntryIndex:
         self._kinds = KindIndex(self._entries, said, vectors)
         common = [self._kinds.say_of(entry) for entry in self._entries]
         self._words = WordIndex(said)
-        # A model compares meanings of what is commonly known, and needs no words of it.
+        # With a model, general knowledge is compared by meaning and needs no words.
         self._common_words = WordIndex(common if vectors is None else ())
         self._meanings = (
             None if vectors is None else MeaningIndex(self._entries, said, common, vectors)
@@ -117,7 +117,7 @@ class EntryIndex:
         """Find what a request may mean.
 
         Args:
-            query: What people say: a name, a thing, what it is for, what is the matter.
+            query: In people's words: a name, a thing, its purpose, a problem.
         """
         words = self._words.ask(query)
         understood = self._understand(query, words)
@@ -139,7 +139,7 @@ class EntryIndex:
         )
 
     def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
-        """Return the request with its words put right, or the name that it looks like."""
+        """Return the request with its spelling corrected, or the name that it resembles."""
         put_right = _put_right(query, words)
         if content_stems(put_right) in self._of_stems or not any(
             word.is_doubtful for word in words
@@ -153,7 +153,7 @@ class EntryIndex:
     def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
         common: tuple[AskedWords, ...] = ()
         part_ratios, missing = None, None
-        # A model of English has nothing to compare in other letters.
+        # An English model cannot compare other scripts.
         is_latin = any(word.isascii() for _, word in content_words(understood))
         if self._vectors is None or self._meanings is None or not is_latin:
             said_ratios = self._words.score_ratios(words)
@@ -189,7 +189,7 @@ class EntryIndex:
         return int(np.count_nonzero(asked.ratios[order] >= asked.ratios[order[0]] - margin))
 
     def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> tuple[Verdict, bool]:
-        """Say how far to trust the likeliest, and whether what is meant is surely called so."""
+        """Return the trust in the likeliest entry, and whether its name is surely the one meant."""
         if not order:
             return Verdict.NOT_REMEMBERED, False
         first, thresholds = order[0], self._thresholds
@@ -210,7 +210,7 @@ class EntryIndex:
         return Verdict.FOUND if is_sure and n_meant == 1 else Verdict.AMBIGUOUS, is_sure
 
     def _is_called(self, request: str, number: int) -> bool:
-        """Return True where the request is for the entry itself, not for what is beside it."""
+        """Return True if the request is for the entry itself, not for something beside it."""
         entry = self._entries[number]
         other_names = (
             text for field, text in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME
@@ -219,10 +219,10 @@ class EntryIndex:
         return is_called or says_purpose(request, entry.purpose)
 
     def _lead_ratio(self, ratios: Floats, first: int) -> float:
-        """Say how far one is ahead of the next of all that is remembered and called otherwise.
+        """Return the lead of an entry over the next one with another name.
 
-        Of all, also where only some may be chosen: that a sink stands in another room makes a
-        toilet in this one no likelier to be meant.
+        All entries count, even if only some may be chosen: a sink in another room does not make
+        a toilet in this one likelier to be meant.
         """
         name = name_key(self._entries[first].name)
         is_other = np.ones(len(ratios), dtype=bool)
@@ -254,7 +254,7 @@ class EntryIndex:
 
 
 def _missing_ratio(asked: _Asked, order: list[int]) -> float:
-    """Say how far something that is not remembered is ahead of the likeliest that is."""
+    """Return the lead of a kind that is not remembered over the likeliest remembered one."""
     if asked.missing is None or (order and asked.basis(order[0]) is Basis.NAME):
         return -math.inf
     if not order:
@@ -271,7 +271,7 @@ def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:
 
 
 def _put_right(query: str, words: Iterable[AskedWords]) -> str:
-    """Return the request with the words put right that only a misspelt word explains."""
+    """Return the request with corrected words where only a misspelling explains them."""
     for word in words:
         if word.corrected != word.shown:
             query = re.sub(rf"\b{re.escape(word.shown)}\b", word.corrected, query)

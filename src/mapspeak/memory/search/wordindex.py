@@ -27,7 +27,7 @@ from mapspeak.memory.search.answer import (
 
 @cache
 def read_wordpieces() -> tuple[str, ...]:
-    """Read the pieces in the order of their numbers, once: nothing ever changes them."""
+    """Read the pieces once, in the order of their numbers; they never change."""
     text = (
         resources.files("mapspeak.memory")
         .joinpath("data/wordpieces.txt")
@@ -43,11 +43,11 @@ def read_words() -> frozenset[str]:
 
 
 _ENDING = re.compile(r"(?<=\w)['\u2019](?:d|ll|m|re|s|t|ve)\b", re.IGNORECASE)
-"""What is left of a word in "I'm", "where's" and "won't"."""
+"""Contracted endings in "I'm", "where's" and "won't"."""
 
 
 def split_words(text: str) -> Iterator[tuple[str, str]]:
-    """Return each word as it stands and as it is compared: small letters without accents."""
+    """Return each word as written and as compared: small letters without accents."""
     for shown in re.findall(r"\w+", text):
         yield shown, shown.lower() if shown.isascii() else without_accents(shown)
 
@@ -55,17 +55,17 @@ def split_words(text: str) -> Iterator[tuple[str, str]]:
 SENTENCES = frozenset(
     {MatchField.DESCRIPTION, MatchField.FEATURE, MatchField.NOTE, MatchField.PLACE}
 )
-"""What people wrote in sentences; "no entry" may be a name."""
+"""Parts of a record written in sentences; elsewhere "no entry" may be a name."""
 _DENIED = re.compile(
     r"\b(?:no|without|neither|nor) (?:(?:an?|any|the|other) )?[^\W\d]\w*(?: (?!or\b)[^\W\d]\w*)?"
     r"(?: or (?:an? |any )?[^\W\d]\w*)*",
     re.IGNORECASE,
 )
-"""What is said not to be there: "no bin", "without a sink or a mirror"."""
+"""Negations: "no bin", "without a sink or a mirror"."""
 
 
 def _without_denied(field: MatchField, text: str) -> str:
-    """Return a text without what it says is not there: that is not found by it."""
+    """Return a text without the things it negates, so that they are not found by it."""
     return _DENIED.sub(" ", text) if field in SENTENCES else text
 
 
@@ -76,7 +76,7 @@ def without_accents(word: str) -> str:
 
 
 def content_words(text: str) -> Iterator[tuple[str, str]]:
-    """Return the words that say what is meant, without "the", "where's" and "take me to"."""
+    """Return the words that matter, without "the", "where's" and "take me to"."""
     words, fillers = list(split_words(_ENDING.sub("", text))), words_of("fillers")
     for number, (shown, word) in enumerate(words, 1):
         # "Aisle A" is not any aisle.
@@ -86,7 +86,7 @@ def content_words(text: str) -> Iterator[tuple[str, str]]:
 
 
 def content_stems(text: str) -> tuple[str, ...]:
-    """Return the stems of the words that say what is meant."""
+    """Return the stems of the words that matter."""
     return tuple(stem(word) for _, word in content_words(text))
 
 
@@ -106,16 +106,16 @@ def stem(word: str) -> str:
 
 
 MIN_LETTERS = 4
-"""A shorter word has too many others near it."""
+"""Shorter words are too similar to many others."""
 
 MIN_LIKENESS_RATIO = 0.8
 _MOST_MISSPELT = 3
 _N_BUCKETS = 32
-"""Letters are counted in so many; two in one bucket let more words through, never fewer."""
+"""Buckets for counting letters; two letters in one let more words through, never fewer."""
 
 
 class LookAlikes:
-    """Texts, ready to be asked for those that are spelt like another."""
+    """Index of texts by similar spelling."""
 
     def __init__(self, texts: Iterable[str]) -> None:
         self._texts = sorted(set(texts))
@@ -123,7 +123,7 @@ class LookAlikes:
         self._lengths = np.array([len(text) for text in self._texts], dtype=int)
 
     def find(self, text: str, *, least_ratio: float, limit: int) -> list[str]:
-        """Find the texts whose spelling is at least so much like this one's, the likest first."""
+        """Find the texts with at least a given similarity of spelling, the most similar first."""
         # It is the bound that difflib calls quick_ratio, for all texts at once.
         n_shared = np.minimum(self._letters, _letters(text)).sum(axis=1)
         is_like = 2 * n_shared >= least_ratio * (self._lengths + len(text))
@@ -132,7 +132,7 @@ class LookAlikes:
 
 
 class Vocabulary:
-    """The words of all records, ready to be asked for one of them."""
+    """Index of the words of all records."""
 
     def __init__(self, words: Iterable[str]) -> None:
         self._words = sorted(set(words))
@@ -149,7 +149,7 @@ class Vocabulary:
         return ways <= {MatchKind.MISSPELT} and word not in read_words()
 
     def find_spellings(self, word: str) -> dict[str, MatchKind]:
-        """Find the words that count as this one, each with how; none where no word does."""
+        """Find the words that count as this one, each with the kind of match."""
         found = dict.fromkeys(self._of_stem.get(stem(word), ()), MatchKind.FORM)
         if word in found:
             found[word] = MatchKind.SAME
@@ -183,7 +183,7 @@ def _letters(word: str) -> NDArray[np.int64]:
 
 
 Texts = Sequence[tuple[MatchField, str]]
-"""What a record says, each text with the part of the record it is."""
+"""The texts of a record, each with its part of the record."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,7 +141,7 @@ def _read_value(text: str) -> Data:
 
 
 def _read_flow(pattern: re.Pattern[str], text: str) -> Iterator[re.Match[str]]:
-    """Return the parts of what stands within brackets."""
+    """Return the parts of the text within brackets."""
     at = 0
     while at < len(text):
         part = pattern.match(text, at)

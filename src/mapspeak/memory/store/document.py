@@ -87,7 +87,7 @@ class MapDocument(Contents):
         return None if item is None else item.record
 
     def find_entry(self, key: str) -> str | None:
-        """Return what the file says under a key of its own, beside the records."""
+        """Return the value of one of the file's own keys, beside the records."""
         said = self.root.get(key)
         return said if isinstance(said, str) else None
 
@@ -102,13 +102,13 @@ class MapDocument(Contents):
     # --- changes ---------------------------------------------------------------------------------
 
     def bound_to(self, map_id: str | None) -> "MapDocument":
-        """Return the file with the map that its waypoints belong to, where it does not say one."""
+        """Return the file with the map of its waypoints, unless it already names one."""
         if self.map_id is not None or map_id is None:
             return self
         return self.with_entry("map", map_id)
 
     def with_entry(self, key: str, value: str) -> "MapDocument":
-        """Return the file with one key of its own, beside the records, saying something else."""
+        """Return the file with one of its own keys, beside the records, changed."""
         entry = entry_text(key, value, indent=0)
         sections = list(self.sections)
         at = next((i for i, each in enumerate(sections) if each.key == key), None)
@@ -120,7 +120,7 @@ class MapDocument(Contents):
         return self._with_section(Section(key=key, head=f"{entry}\n"), self._find_places())
 
     def with_record(self, record: Record) -> "MapDocument":
-        """Return the file with a record written, in its own place where its key is there already.
+        """Return the file with a record written, in place of the one with its key if there is one.
 
         Raises:
             SemanticMapError: The file is laid out in a way that cannot be written to.
@@ -145,7 +145,7 @@ class MapDocument(Contents):
         return self._with_last(section, new)
 
     def _with_last(self, section: Section, new: ListedRecord) -> "MapDocument":
-        """Return the file with an item behind the last one, in front of what stands behind that."""
+        """Return the file with an item inserted directly after the last one."""
         items = dict(self.lists[section.key])
         *others, last = items.values()
         if last.text is None or new.text is None:
@@ -172,7 +172,7 @@ class MapDocument(Contents):
         return self._read_again([changed if s is section else s for s in self.sections])
 
     def _find_places(self) -> int:
-        """Return which section the places are; the number of sections where there is none."""
+        """Return the index of the section of places; the number of sections if there is none."""
         keys = [section.key for section in self.sections]
         return keys.index("waypoints") if "waypoints" in keys else len(keys)
 
@@ -188,7 +188,7 @@ class MapDocument(Contents):
         return self._read_again([*sections[:at], section, *sections[at:]])
 
     def _read_again(self, sections: list[Section]) -> "MapDocument":
-        """Read the changed text before anybody relies on it."""
+        """Read the changed text again before it is used."""
         try:
             contents = read_contents("".join(self._texts(sections)), self)
         except SemanticMapError as error:
@@ -200,7 +200,7 @@ class MapDocument(Contents):
         return after
 
     def _read_item(self, list_key: str, text: str, data: dict[str, Data]) -> ListedRecord:
-        """Return a record as it reads in its new text."""
+        """Return a record as read from its new text."""
         item = read_item(list_key, text, str(data.get("id")), self.map_id)
         if data_of(item.record) != data:
             raise self._layout_fault(list_key)
@@ -222,10 +222,10 @@ def _new_text(data: dict[str, Data], indent: int) -> str:
 
 
 def _changed_text(text: str, old: dict[str, Data], new: dict[str, Data], indent: int) -> str:
-    """Return the text of a record that is to say something else."""
+    """Return the changed text of a record."""
     own, rest = _new_text(old, indent), text.lstrip("\n")
     if rest.startswith(own) and not rest[len(own) :].strip("\n"):
-        # No one else had a hand in it.
+        # Nothing else edited it.
         return text.replace(own, _new_text(new, indent))
     return edited_item(text, indent=indent, old=old, new=new)
 
@@ -240,7 +240,7 @@ def parse_document(
     """Read a semantic map file.
 
     Args:
-        previous: What was read from it before; spares reading unchanged records again.
+        previous: The previous reading; unchanged records are not parsed again.
 
     Raises:
         SemanticMapError: It has a fault; the message names the line and the column.

@@ -1,6 +1,6 @@
-"""One file that is replaced as a whole, and is on the disk when a write returns.
+"""A file that is replaced atomically, and is on the disk when a write returns.
 
-A crash at any moment leaves the file as it was before or as it is after, never in between.
+A crash at any moment leaves either the old file or the new one.
 """
 
 import contextlib
@@ -23,10 +23,10 @@ _FOLDER_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
 
 
 Fingerprint = tuple[int, int, int, int, int]
-"""What tells one state of a file from another without reading it.
+"""Distinguishes states of a file without reading it.
 
-Last comes the time of change: unlike that of modification, no program sets it back, so that
-`cp -p` and `touch -r` show.
+The last item is the time of change (ctime): unlike that of modification, no program can set it
+back, so `cp -p` and `touch -r` are noticed.
 """
 
 
@@ -42,13 +42,13 @@ class DurableFile:
         self._lock_timeout_s = lock_timeout_s
 
     def fingerprint(self) -> Fingerprint | None:
-        """Return the file's present state; None where there is no file."""
+        """Return the file's present state; None without a file."""
         with self._explained("look at"):
             status = self._status()
             return None if status is None else _fingerprint_of(status)
 
     def read(self) -> tuple[bytes, Fingerprint | None]:
-        """Return the content and the state it belongs to; nothing and None where no file is."""
+        """Return the content and its state; empty and None without a file."""
         with self._explained("read"):
             status = self._status()
             if status is None:
@@ -82,7 +82,7 @@ class DurableFile:
         """Put a new content in place, for a caller that holds the lock.
 
         Returns:
-            The state after; None, with nothing done, where the file is not in the expected state.
+            The new state; None, with nothing done, if the file is not in the expected state.
         """
         target = self._target()
         self._require_small(len(content))
@@ -145,7 +145,7 @@ def _fingerprint_of(status: os.stat_result) -> Fingerprint:
 
 
 def write_synced(path: Path, content: bytes, *, like: os.stat_result | None = None) -> Fingerprint:
-    """Write a file anew; what it says, but not its name, is on the disk when this returns.
+    """Write a new file; its content, but not its name, is on the disk when this returns.
 
     Args:
         like: A file whose permissions and, as far as we may, owner it takes.
@@ -165,7 +165,7 @@ def write_synced(path: Path, content: bytes, *, like: os.stat_result | None = No
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the new name of a file last, where the system can."""
+    """Make the new name of a file durable, if the system supports it."""
     if sys.platform == "win32":
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""Change one record in its own text: what says the same keeps its lines, its comments all stay."""
+"""Edit one record in its own text: unchanged parts keep their lines, all comments stay."""
 
 from collections.abc import Iterator
 
@@ -10,10 +10,10 @@ from mapspeak.memory.store.yamlwriting import entry_text, flow_text, line_text
 
 
 def edited_item(text: str, *, indent: int, old: dict[str, Data], new: dict[str, Data]) -> str:
-    """Return the text of one item of a list, changed from one saying to another.
+    """Return the text of one item of a list, changed from one content to another.
 
-    A key or an item of a list within it that says something else is written anew, with the comments
-    that it had behind it. People's own keys stay.
+    A changed key or list item within it is rewritten, with the comments behind it. People's own
+    keys stay.
     """
     body, rest = split_end(text, indent)
     listed = compose(body)
@@ -90,12 +90,12 @@ def _line_start(text: str, node: Node) -> int:
 
 
 def merged_data(said: Data, old: Data, new: Data) -> Data:
-    """Return what is to be said: as it is spelt where nothing changed, with people's own keys.
+    """Return the new content, with people's own keys and the spelling of unchanged parts.
 
     Args:
-        said: What stands there.
-        old: How mapspeak would have said that.
-        new: How it says what is to stand there.
+        said: The present content.
+        old: The present content as mapspeak would write it.
+        new: The new content as mapspeak writes it.
     """
     if old == new:
         return said
@@ -121,7 +121,7 @@ def merged_data(said: Data, old: Data, new: Data) -> Data:
 def _find_sources(old: list[Data], new: list[Data]) -> tuple[list[int | None], list[int]]:
     """Find which old item each new one continues, and the old ones that none continues.
 
-    An item continues one that says the same, or else one with the same label.
+    An item continues one with the same content, or else one with the same label.
     """
     left = dict(enumerate(old))
     sources: list[int | None] = [None] * len(new)

@@ -1,4 +1,4 @@
-"""Forgetting places and things, so that it can be undone."""
+"""Forget places and things reversibly."""
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
@@ -12,17 +12,17 @@ Seen = tuple[str, str, float | None, float | None]
 """One view of a thing: the `name_key` of the place, label, bearing and range."""
 
 _Test = Callable[[Waypoint, Landmark | None], bool]
-"""Tells whether a place, or one of its landmarks, is meant."""
+"""Returns True for the places, or landmarks, to change."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forgotten:
-    """What was forgotten, or is remembered again.
+    """Records that were forgotten, or are remembered again.
 
     Attributes:
-        places: Names of places that are so as a whole.
-        seen_from: Names of places of which single landmarks are so.
-        n_landmarks: How many these are.
+        places: Names of whole places.
+        seen_from: Names of places with single such landmarks.
+        n_landmarks: Number of these landmarks.
     """
 
     places: tuple[str, ...] = ()
@@ -31,7 +31,7 @@ class Forgotten:
 
 
 def view_of(waypoint: str, landmark: Landmark) -> Seen:
-    """Return by what a view is known again, in whichever frame the place is."""
+    """Return the key of a view, independent of the frame of its place."""
     return name_key(waypoint), landmark.label, landmark.bearing_rad, landmark.range_m
 
 
@@ -53,7 +53,7 @@ def forget_label(store: MemoryStore, label: str) -> Forgotten:
 
 
 def restore(store: MemoryStore, name: str) -> Forgotten:
-    """Remember again what was forgotten under a name: a place, or landmarks of that label."""
+    """Restore a place, or landmarks, forgotten under a name."""
     key = name_key(name)
     return _mark(
         store,
@@ -63,7 +63,7 @@ def restore(store: MemoryStore, name: str) -> Forgotten:
 
 
 def rename_place(store: MemoryStore, name: str, *, to: str) -> None:
-    """Give a place another name; under its old one it is forgotten.
+    """Rename a place; the old name is forgotten.
 
     Raises:
         SemanticMapError: There is no such place, or another one has that name.
@@ -84,7 +84,7 @@ def rename_place(store: MemoryStore, name: str, *, to: str) -> None:
 
 
 def _mark(store: MemoryStore, is_meant: _Test, *, is_gone: bool = True) -> Forgotten:
-    """Mark what is meant as gone or not, all of it or nothing."""
+    """Mark the matching records as gone or not, all or none."""
     done: list[Forgotten] = []
 
     def change(known: SemanticMap) -> Iterable[Waypoint]:

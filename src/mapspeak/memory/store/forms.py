@@ -1,6 +1,6 @@
-"""How single values stand in a record: a form reads what stands there, and writes it.
+"""Forms of single values in a record: each parses its text and writes it.
 
-What is wrong with a record is gathered, with the keys and numbers of items that lead to it.
+Faults of a record are collected, with the path of keys and item numbers to each.
 """
 
 import math
@@ -24,10 +24,10 @@ _TRUTHS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """One thing that is wrong with a record.
+    """A fault of a record.
 
     Attributes:
-        expected: What is wrong, as it goes on behind the path.
+        expected: Description of the fault, to follow the path.
     """
 
     path: Path
@@ -36,24 +36,24 @@ class Wrong:
 
 
 class WrongError(Exception):
-    """What stands in a record is not of its form."""
+    """A value in a record does not have its form."""
 
     def __init__(self, *wrongs: Wrong) -> None:
         super().__init__()
         self.wrongs = wrongs
 
     def behind(self, step: int | str) -> list[Wrong]:
-        """Return what is wrong, as seen from one step further up."""
+        """Return the faults with one more step at the front of their paths."""
         return [replace(each, path=(step, *each.path)) for each in self.wrongs]
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One form of values.
+    """A form of values.
 
     Attributes:
-        read: Makes a value of what stands in a record; raises `WrongError`.
-        write: Makes of a value what stands in a record; None where that says nothing.
+        read: Parses the value in a record; raises `WrongError`.
+        write: Returns a value's text for a record; None for an empty value.
     """
 
     read: Callable[[Any], object]
@@ -61,7 +61,7 @@ class Form:
 
 
 def wrong(expected: str, value: object) -> WrongError:
-    """Return the error that says what is wrong with one value."""
+    """Return the error for the fault of one value."""
     return WrongError(Wrong((), expected, value))
 
 
@@ -198,7 +198,7 @@ def one_of(words: type[StrEnum], *, unsaid: StrEnum | None = None) -> Form:
     """Return the form of a closed vocabulary.
 
     Args:
-        unsaid: The word that is not written down.
+        unsaid: The default word, which is not written.
     """
 
     def read(value: Data) -> object:

@@ -1,4 +1,4 @@
-"""What every memory of places promises and does alike, above the records that each keeps."""
+"""The interface of every memory of places, and the behaviour that all share."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
@@ -21,10 +21,10 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WriteReceipt:
-    """What a write did; it is on the disk.
+    """Result of a write, which is on the disk.
 
     Attributes:
-        waypoint: As it is remembered from now on: millimetres, hundredths of a degree.
+        waypoint: As remembered, rounded to millimetres and hundredths of a degree.
     """
 
     waypoint: Waypoint
@@ -32,11 +32,11 @@ class WriteReceipt:
 
 
 class Records(Protocol):
-    """The records of a memory while they are changed, all of it or nothing."""
+    """The records of a memory during an atomic change."""
 
     @property
     def map_id(self) -> str | None:
-        """The map that the memory says it is of."""
+        """The map that the memory names as its own."""
 
     @property
     def frames(self) -> Frames:
@@ -49,13 +49,13 @@ class Records(Protocol):
         """Return all events by their ids."""
 
     def find_place(self, key: str) -> Waypoint | None:
-        """Return what is remembered under a `name_key`; no one else writes it from now on."""
+        """Return the place under a `name_key`, locked against other writers."""
 
     def bind(self, map_id: str | None) -> None:
-        """Bind the memory to the map that its waypoints belong to, where it does not say one."""
+        """Bind the memory to the map of its waypoints, unless it already names one."""
 
     def put(self, record: OneRecord) -> OneRecord:
-        """Write a record, in place of the one of its key; return it as it reads."""
+        """Write a record in place of the one with its key; return it as read back."""
 
     def put_places(self, waypoints: Iterable[Waypoint]) -> None:
         """Write many places."""
@@ -96,7 +96,7 @@ class MemoryStore(ABC):
 
     @abstractmethod
     def read_entry(self, key: str) -> str | None:
-        """Return what the memory says under a key of its own, such as `snapshot`; as `read`."""
+        """Return the entry under one of the memory's own keys, such as `snapshot`; as `read`."""
 
     @abstractmethod
     def change(
@@ -106,7 +106,7 @@ class MemoryStore(ABC):
         alone: bool = False,
         binding: str | None = None,
     ) -> Result:
-        """Change records, all of it or nothing, and return what the change does.
+        """Change records atomically, and return the result of the change.
 
         Args:
             change: Called once or more often.
@@ -115,18 +115,18 @@ class MemoryStore(ABC):
         """
 
     def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Create a waypoint, or put it in place of the one of that name.
+        """Create a waypoint, or replace the one of that name.
 
-        Where the known one is of a frame that is aligned with the waypoint's, it stays in its own.
-        Where that is not known, both stay, the new one with a number behind its name.
+        If the frame of the known one is aligned with the waypoint's, the record keeps its frame.
+        If the alignment is unknown, both stay, the new one with a number behind its name.
         """
         return self._write(waypoint, lambda _, placed: placed)
 
     def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
-        """Write many waypoints, all or none; into the memory of whichever map they are of.
+        """Write many waypoints, all or none; each into the memory of its map.
 
         Args:
-            change: Tells which, from all that are remembered; called once or more often.
+            change: Returns them, given all remembered places; called once or more often.
         """
 
         def write(records: Records) -> None:
@@ -153,7 +153,7 @@ class MemoryStore(ABC):
     ) -> tuple[WriteReceipt, Merge]:
         """Join a waypoint with what is remembered under its name; of frames, see `write`.
 
-        What another program remembers of it in the same moment is joined, too.
+        Changes by another program at the same moment are joined, too.
 
         Args:
             gone: Labels of landmarks that are not there any more.
@@ -169,10 +169,10 @@ class MemoryStore(ABC):
         return receipt, merges[-1]
 
     def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
-        """Write what is known of frames, all or nothing; no record changes.
+        """Write the frames, all or none; no record changes.
 
         Args:
-            change: Tells how they read, from how they do; called once or more often.
+            change: Returns the new frames, given the present ones; called once or more often.
         """
 
         def write(records: Records) -> Frames:
@@ -203,8 +203,8 @@ class MemoryStore(ABC):
 def _in_its_frame(waypoint: Waypoint, records: Records) -> Waypoint:
     """Return a waypoint as a memory keeps it: in the frame and under the name of its record.
 
-    A record of its name in a frame of which it is not known how it lies is another place: the
-    waypoint gets a number behind its name.
+    A record of its name in a frame of unknown alignment is another place: the waypoint gets a
+    number behind its name.
     """
     for number in count(1):
         name = waypoint.name if number == 1 else f"{waypoint.name} ({number})"
@@ -216,11 +216,11 @@ def _in_its_frame(waypoint: Waypoint, records: Records) -> Waypoint:
             is_moved = known.frame != waypoint.frame
             placed = waypoint.moved(motion) if is_moved else waypoint
             return replace(placed, name=name, frame=known.frame, room_id=waypoint.room_id)
-    raise AssertionError  # Numbers do not end.
+    raise AssertionError  # There is always a free number.
 
 
 def _event_in_its_frame(event: Event, known: Event | None, frames: Frames) -> Event:
-    """Return an event as a memory keeps it: in the frame of what is known under its id."""
+    """Return an event as a memory keeps it: in the frame of the record with its id."""
     if known is None or known.frame == event.frame:
         return event
     motion = frames.find_transform(of=event.frame, into=known.frame)

@@ -1,4 +1,4 @@
-"""Read a semantic map file: its records, and where each of its faults stands."""
+"""Read a semantic map file: its records, and the position of each fault."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -45,12 +45,12 @@ class ListedRecord:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Contents:
-    """What a file says.
+    """Content of a file.
 
     Attributes:
         sections: Without the texts of their items, which are in `lists`.
         lists: The records of each list of `LISTS` by their keys, in the order of the file.
-        root: What the file says beside its records.
+        root: The file's other keys, beside its records.
     """
 
     sections: tuple[Section, ...] = ()
@@ -66,7 +66,7 @@ def read_contents(text: str, previous: Contents) -> Contents:
     """Read a text whose lines end in a line feed.
 
     Args:
-        previous: What was read before; spares reading unchanged records again.
+        previous: The previous reading; unchanged records are not parsed again.
 
     Raises:
         TextFaultError: It has a fault.
@@ -87,7 +87,7 @@ def read_contents(text: str, previous: Contents) -> Contents:
 
 
 def _read_root(sections: tuple[Section, ...]) -> tuple[MappingNode | None, str | None]:
-    """Read what stands beside the records: the heads of all sections, as one document."""
+    """Read the rest beside the records: the heads of all sections, as one document."""
     try:
         root = compose("".join(section.head for section in sections))
         data = data_of(root)
@@ -115,7 +115,7 @@ def _read_root(sections: tuple[Section, ...]) -> tuple[MappingNode | None, str |
 
 
 def _line_in_file(line: int, sections: tuple[Section, ...]) -> int:
-    """Return where a line of all heads together stands in the file."""
+    """Return the line number in the file of a line of the joined heads."""
     n_head_lines = n_item_lines = 0
     for section in sections:
         n_head_lines += section.head.count("\n")
@@ -192,7 +192,7 @@ def read_item(
         try:
             return replace(_item_of(list_key, data, default_id, map_id), text=place)
         except SemanticMapError:
-            pass  # Read again below, to say where the fault is.
+            pass  # Read again below, to locate the fault.
     tree = compose(place)
     if isinstance(tree, SequenceNode) and len(tree.value) == 1:
         return replace(_read_node(list_key, tree.value[0], default_id, map_id), text=place)

@@ -1,4 +1,4 @@
-"""What the records of a memory say: one table of keys tells how each is read, written, explained.
+"""Format of a memory's records: one table defines how each key is read, written and explained.
 
 A record is data (`yamltext.Data`): text under the paper's keys, in metres and degrees. The semantic
 map file, the rows of a database and GeoJSON hold the same records.
@@ -56,14 +56,14 @@ _EXAMPLES: Mapping[object, str] = {
 
 
 class WrongRecordError(SemanticMapError):
-    """A record does not say what it must.
+    """A record lacks a required value, or has a wrong one.
 
     Attributes:
         path: The keys and numbers of items that lead to the first fault.
     """
 
     def __init__(self, wrongs: tuple[Wrong, ...], example: str) -> None:
-        # A key that is none is more often the misspelling of one that is missing than one too many.
+        # An unknown key is more often the misspelling of a missing one than a superfluous one.
         first, *others = sorted(wrongs, key=lambda each: each.expected != _NO_KEY)
         self.path = first.path
         told = ".".join(tell_name(str(step)) for step in first.path) or "The record"
@@ -130,7 +130,7 @@ class RecordKind:
             raise WrongRecordError(error.wrongs, self.example) from None
 
     def write(self, value: object) -> dict[str, Data]:
-        """Return what a record says of a value; None under a key of which it says nothing."""
+        """Return the record of a value; None under keys without content."""
         return {key.name: key.form.write(getattr(value, key.field)) for key in self.keys}
 
     def _read(self, data: Data, **fields: object) -> Any:  # noqa: ANN401 - what it makes
@@ -279,7 +279,7 @@ FILE = RecordKind(
         Key("snapshot", _ANY),
     ),
 )
-"""What stands beside the records; other keys are people's own notes."""
+"""Keys beside the records; unknown keys are people's own notes."""
 
 
 # --- reading and writing ---------------------------------------------------------------------
@@ -291,12 +291,12 @@ def list_key_of(record: Record) -> str:
 
 
 def key_of(record: Record) -> str:
-    """Return what tells a record from others of its kind."""
+    """Return the key that identifies a record among those of its kind."""
     return name_key(record.name) if isinstance(record, Waypoint) else record.id
 
 
 def read_record(list_key: str, data: Data, map_id: str | None, *, default_id: str = "") -> Record:
-    """Return what a record describes.
+    """Return the value that a record describes.
 
     Args:
         map_id: The map that a place of this memory is on.
@@ -313,9 +313,9 @@ def read_record(list_key: str, data: Data, map_id: str | None, *, default_id: st
 
 
 def data_of(record: Record) -> dict[str, Data]:
-    """Return what a record says: millimetres and hundredths of a degree.
+    """Return the record of a value, rounded to millimetres and hundredths of a degree.
 
-    That of a place has all its keys.
+    The record of a place has all its keys.
     """
     data = LISTS[list_key_of(record)].write(record)
     if not isinstance(record, Waypoint):
@@ -326,7 +326,7 @@ def data_of(record: Record) -> dict[str, Data]:
 
 
 def _without_pose(landmark: Data, pose: Data) -> Data:
-    """Return what is said of a landmark without a pose that is the place's own."""
+    """Return the record of a landmark, without a pose equal to the place's own."""
     if not isinstance(landmark, dict) or landmark.get("seen_from") != pose:
         return landmark
     said = {key: value for key, value in landmark.items() if key != "seen_from"}

@@ -22,7 +22,7 @@ from mapspeak.memory.waypoint import SemanticMap, Waypoint
 LOCK_TIMEOUT_S = 5.0
 
 _N_TRIES = 5
-"""How often a write starts anew because an editor saved the file in the same moment."""
+"""Retries of a write while an editor saves the file at the same moment."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class SemanticMapStore(MemoryStore):
         return cast("tuple[Event, ...]", self._document(self._look()).records_of("events"))
 
     def read_entry(self, key: str) -> str | None:
-        """Return what the file says under a key of its own."""
+        """Return the value of one of the file's own keys."""
         return self._document(self._look()).find_entry(key)
 
     def change(
@@ -76,7 +76,7 @@ class SemanticMapStore(MemoryStore):
         alone: bool = False,  # noqa: ARG002 - every writer of a file is alone
         binding: str | None = None,  # noqa: ARG002 - likewise
     ) -> Result:
-        """Replace the file by a changed one, whoever else writes meanwhile."""
+        """Replace the file by a changed one, despite concurrent writers."""
         self._look()  # Others do not wait while this reads what it never read before.
         with self._file.locked():
             for _ in range(_N_TRIES):

@@ -19,7 +19,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.memory.quoting import quote_name
 
 Data = str | None | list["Data"] | dict[str, "Data"]
-"""What a node says, without its place: text, nothing, a list or a mapping."""
+"""Content of a node without its position: text, nothing, a list or a mapping."""
 
 Path = tuple[int | str, ...]
 """The keys and the numbers of items that lead to a part of some data."""
@@ -37,10 +37,10 @@ class Bare(str):
 
 
 class TextFaultError(SemanticMapError):
-    """The text is wrong at one place; lines and columns are counted from 1.
+    """A fault at one place of the text; lines and columns are counted from 1.
 
     Attributes:
-        other_line: Of what it clashes with, if anything.
+        other_line: Line that it conflicts with, if any.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class TextFaultError(SemanticMapError):
         self.other_line = other_line
 
     def moved(self, n_lines: int) -> "TextFaultError":
-        """Return the same fault where the text stands so many lines below the start of a file."""
+        """Return the same fault, moved down by a number of lines."""
         return TextFaultError(
             self.message,
             hint=self.hint,
@@ -85,7 +85,7 @@ def compose(text: str) -> Node | None:
         problem = f"the character U+{error.character:04X} is not allowed"
         raise _not_yaml(text, problem, error.position) from error
     except (YAMLError, ValueError, ArithmeticError, LookupError, AssertionError) as error:
-        # The parser lets some of its own slips through, such as a \U escape beyond Unicode.
+        # The parser does not wrap all its own errors, such as a \U escape beyond Unicode.
         raise _not_yaml(text, str(error), 0) from error
     return node
 
@@ -151,10 +151,10 @@ def _not_yaml(text: str, problem: str, offset: int) -> TextFaultError:
 
 
 def data_of(node: Node | None) -> Data:
-    """Return what a node says.
+    """Return the content of a node.
 
     Raises:
-        TextFaultError: A key is no word, or stands twice in one mapping.
+        TextFaultError: A key is not a word, or occurs twice in one mapping.
     """
     if isinstance(node, MappingNode):
         return {key: data_of(value) for key, value in entries_of(node)}
@@ -212,7 +212,7 @@ def find_comments(text: str, nodes: Iterable[Node], start: int, end: int) -> lis
     """Return the comments in a stretch of text, in their order.
 
     Args:
-        nodes: What stands in that stretch.
+        nodes: The nodes in that stretch.
     """
     comments = list[str]()
     for leaf in (leaf for node in nodes for leaf in _leaves(node)):

@@ -1,4 +1,4 @@
-"""How records are laid out as YAML: a key a line, and one line for what has no lines of its own."""
+"""YAML layout of records: one line per key, and one line for each nested value without lines."""
 
 import json
 import re
@@ -15,7 +15,7 @@ _SPECIAL_IN_FLOW = re.compile(r"[,\[\]{}:#?]")
 
 
 def is_plain(text: str) -> bool:
-    """Return True when every YAML reader takes the unquoted text, on its own line, as it is."""
+    """Return True if every YAML reader reads the unquoted text, on its own line, unchanged."""
     return (
         text[:1].isalpha()
         and text.isprintable()

@@ -20,7 +20,7 @@ SKIRTING: Colour = (112, 118, 124)
 FRAME: Colour = (104, 116, 128)
 LAMP: Colour = (255, 255, 252)
 TILE_M = {Surface.FLOOR: 4.0, Surface.WALL: 2.0, Surface.CEILING: 1.2}
-"""How many metres one drawing of a repeated surface stands for."""
+"""Metres covered by one tile of a repeated surface."""
 
 LOWEST_CEILING_M = 2.5
 SKIRTING_M = 0.09
@@ -40,7 +40,7 @@ class Panel:
         corner: Its lower left corner.
         right: From there to the lower right one.
         up: From there to the upper left one.
-        surface: What is drawn on it, repeated.
+        surface: The repeated drawing on it.
     """
 
     corner: FloatArray
@@ -105,7 +105,7 @@ def _floor_and_ceiling(world: World, ceiling_m: float) -> Iterator[Panel]:
 
 
 def _fill_corners(walls: Sequence[WorldWall]) -> Iterator[WorldWall]:
-    """Return walls that reach over their ends where others meet them, so that corners are full."""
+    """Return walls extended where others meet their ends, so that corners are closed."""
     meeting: dict[tuple[int, int], list[WorldWall]] = defaultdict(list)
     for wall in walls:
         for end in (wall.start, wall.end):

@@ -1,9 +1,9 @@
 """The front camera, and the simulated detector that looks through it.
 
 The detector is not an object detector. It knows which pixels show which object, and from nothing
-else makes up what a trained detector would say: things too small, too far or hidden go unreported,
-some that could be seen are missed, and directions and distances carry noise. Wherever its reports
-show, they are called those of a simulated detector.
+else simulates the reports of a trained detector: things too small, too far or hidden go unreported,
+some visible ones are missed, and directions and distances carry noise. Its reports are always
+labelled as those of a simulated detector.
 """
 
 import math
@@ -31,11 +31,11 @@ CAMERA_HEIGHT_M = 1.1
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SegmentedView:
-    """Which object each pixel shows, and how far it is. Never leaves the simulator.
+    """The object at each pixel, and its distance. Never leaves the simulator.
 
     Attributes:
-        object_ids: Which of them each pixel shows, shape (height, width); -1 for none.
-        range_m: Along the floor from the camera to what the pixel shows; infinite for nothing.
+        object_ids: Object at each pixel, shape (height, width); -1 for none.
+        range_m: Distance along the floor from the camera to the surface; infinite for nothing.
         bearing_rad: Of each column from the camera's heading, left positive, shape (width,).
     """
 
@@ -60,7 +60,7 @@ class PinholeCamera:
     def observe(
         self, world_from_camera: Pose, *, width_px: int = 640, height_px: int = 480
     ) -> SegmentedView:
-        """Return which object each pixel shows, and no picture."""
+        """Return the object at each pixel, without drawing a picture."""
         viewpoint = _look_from(world_from_camera, width_px, height_px)
         visibility = look(self._scene, viewpoint)
         owners = np.append(self._scene.triangles.owners[visibility.triangles], BUILDING)
@@ -89,7 +89,7 @@ def measure_shares_in_view(world: World, pose: Pose) -> dict[str, float]:
     """Return the share of the camera's picture that each thing in it takes up, by its name.
 
     Args:
-        pose: Where the robot stands, in the world's own frame.
+        pose: Of the robot, in the world's own frame.
     """
     view = PinholeCamera(world).observe(pose, width_px=320, height_px=240)
     numbers, counts = np.unique(view.object_ids[view.object_ids >= 0], return_counts=True)
@@ -108,13 +108,13 @@ _BEARING_NOISE_RAD = math.radians(0.5)
 _RANGE_NOISE_RATIO = 0.03
 _CONFIDENCE_NOISE_RATIO = 0.03
 _CONFIDENCES = (0.5, 0.97)
-"""Of a thing that can only just be seen, and of one that fills the picture."""
+"""For a thing that is just visible, and for one that fills the picture."""
 _MISSES = (0.25, 0.02)
-"""How often such a thing is missed."""
+"""Miss rates of such things."""
 
 
 class SimulatedDetector:
-    """Makes up what an object detector would report. Its noise and its misses come from a seed."""
+    """Simulates the reports of an object detector, with seeded noise and misses."""
 
     def __init__(self, *, random: np.random.Generator) -> None:
         self._random = random
@@ -129,7 +129,7 @@ class SimulatedDetector:
         )
 
     def _blur(self, seen: Detection) -> Detection:
-        """Return a detection with noise on all that was measured."""
+        """Return a detection with noise on all measured values."""
         bearing, spread, doubt = self._random.normal(size=3)
         confidence = seen.confidence_ratio + _CONFIDENCE_NOISE_RATIO * doubt
         return replace(
@@ -163,7 +163,7 @@ def _find_sightings(view: SegmentedView) -> Iterator[tuple[Detection, float]]:
 def _between(ends: tuple[float, float], area_ratio: float) -> float:
     """Return a value between that of the smallest area and that of the whole picture.
 
-    Half the way is gone at four times the smallest area.
+    It is halfway at four times the smallest area.
     """
     smallest, whole = ends
     return whole + (smallest - whole) * math.sqrt(SMALLEST_AREA_RATIO / area_ratio)
@@ -174,17 +174,17 @@ def _between(ends: tuple[float, float], area_ratio: float) -> float:
 
 _BACKGROUND = (96.0, 98.0, 102.0)
 _FINER = 2
-"""How many times finer than the picture edges are looked at, across and down."""
+"""Supersampling of edges, across and down."""
 
 _HIGHLIGHT = 150.0
 _HIGHLIGHT_SHARPNESS = 18
 _LIGHT_FROM = (-0.55, -0.45, 0.70)
-"""Where highlights come from: in front of the thing (towards the eye), left of it, above it."""
+"""Direction of highlights: from in front of the thing (towards the eye), left and above."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Samples:
-    """Points of the picture that are given a colour.
+    """Sample points of the picture.
 
     Attributes:
         rows: Of `Visibility.triangles`.
@@ -298,7 +298,7 @@ class _Shader:
 
 
 def _find_highlights(scene: Scene, chosen: IntArray, viewpoint: Viewpoint) -> FloatArray:
-    """Return what shine adds at the corners of round things (Blinn's half vector, 1977)."""
+    """Return the highlights at the corners of round things (Blinn's half vector, 1977)."""
     shine = np.zeros((len(chosen), 3))
     is_round = np.flatnonzero(scene.triangles.is_round[chosen])
     corners = scene.triangles.corners[chosen[is_round]]

@@ -1,10 +1,10 @@
-"""Light: lamps under the ceiling, walls that hold it back, and the dark where things touch.
+"""Light: lamps under the ceiling, walls that block it, and dark creases where things touch.
 
 It is computed once for a world. Values are encoded for a picture (to the power of 1 / 2.2), so that
 the colour of a pixel is the drawn colour times the light.
 
-Soft shadows lie where things touch: on the floor around what stands, on the wall around what hangs.
-Both come from outlines that are filled and blurred. The light on the building's panels is one
+Soft shadows lie where things touch: on the floor around standing things, on the wall around hanging
+ones. Both are filled and blurred outlines. The light on the building's panels is one
 picture, fine enough for them.
 """
 
@@ -29,7 +29,7 @@ Float32Array = NDArray[np.float32]
 
 _CELL_M = 0.06
 _LAYERS = (((0.0, 0.12), 0.05, 0.40), ((0.0, 0.4), 0.18, 0.50), ((0.1, 1.2), 0.40, 0.60))
-"""Each a band of heights, how far it blurs, and how dark it is."""
+"""Each has a band of heights, a blur radius and a darkness."""
 
 _WALL_REACH_M = 0.12
 _WALL_BLUR_M = 0.05
@@ -39,11 +39,11 @@ _WALL_DROP_M = 0.04
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crowding:
-    """How closely the floor is crowded: 0 free, 1 covered.
+    """Crowding of the floor: 0 free, 1 covered.
 
     Attributes:
         by_walls: Shape (rows, columns); row 0 is at the origin.
-        by_all: Likewise, by walls and by what stands there.
+        by_all: Likewise, by walls and standing things.
         origin: The outer corner of the first cell.
     """
 
@@ -133,7 +133,7 @@ def _project_on(thing: WorldObject, panel: Panel) -> list[FloatArray]:
 _LAMP_SPACING_M = 3.2
 _LAMP_REACH_M = 10.0
 _LAMP_GAP_M = 0.3
-"""How far lamps stay from walls."""
+"""Distance of lamps from walls."""
 _LAMP_STRENGTH = 0.5
 _AMBIENT = 0.38
 _FROM_FLOOR = 0.22
@@ -143,7 +143,7 @@ _EXPOSURE = 1.6
 _GAMMA = 2.2
 
 _WALL_CUT_M = (1.2, 1.3)
-"""Where walls hold back light: above low partitions, below the tops of doors."""
+"""Heights at which walls block light: above low partitions, below the tops of doors."""
 _SOFT_EDGE_BEAMS = (-4, -2, 0, 2, 4)
 """Beams of half a degree over which the edge of a wall's shadow is spread."""
 
@@ -153,8 +153,8 @@ class Light:
     """All light of a world.
 
     Attributes:
-        lamps: Where they hang, shape (n, 3).
-        reach_m: How far each shines along each of the LiDAR's directions, shape (n, 720).
+        lamps: Their positions, shape (n, 3).
+        reach_m: Range of each along each of the LiDAR's directions, shape (n, 720).
     """
 
     lamps: FloatArray
@@ -178,7 +178,7 @@ class Light:
 
 
 def find_light(world: World) -> Light:
-    """Hang lamps in the rooms of a world, and find what keeps their light out."""
+    """Hang lamps in the rooms of a world, and find what blocks their light."""
     walls = slice_world(replace(world, objects=()), low_m=_WALL_CUT_M[0], high_m=_WALL_CUT_M[1])
     low, high = find_bounds(world)
     everywhere = (low, Point(high.x, low.y), high, Point(low.x, high.y))
@@ -245,7 +245,7 @@ IntArray = NDArray[np.intp]
 
 _FINEST_STEP_M = 0.06
 _MOST_SAMPLES = 1_000_000
-"""About as many as a building of 3,000 square metres of floor has at the finest step."""
+"""About the number for a building of 3,000 square metres of floor at the finest step."""
 _WIDTH_PX = 2048
 
 
@@ -272,7 +272,7 @@ class LightMap:
 
 
 def map_light(panels: Sequence[Panel], things: Sequence[WorldObject], light: Light) -> LightMap:
-    """Compute the light on all panels, with the shadows of what hangs on walls."""
+    """Compute the light on all panels, with the shadows of things on walls."""
     n_samples = _count_samples(panels)
     corners, height = pack(n_samples, _WIDTH_PX)
     lit = _light_each(panels, n_samples, light)

@@ -1,4 +1,4 @@
-"""The pinhole, and which triangle each pixel shows.
+"""Pinhole projection, and the visible triangle at each pixel.
 
 Instead of clipping at the near plane, a triangle keeps three functions e0, e1, e2 that are linear
 on the picture: e_i is the share of corner i, divided by depth. A pixel lies in the triangle where
@@ -26,13 +26,13 @@ IntArray = NDArray[np.intp]
 
 NEAR_M = 0.05
 _OVERLAP_PX = 0.01
-"""How far triangles reach over their edges, so that rounding leaves no gap between neighbours."""
+"""Triangles extend over their edges by this, so that rounding leaves no gaps."""
 _THINNEST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Viewpoint:
-    """Where a level pinhole camera stands, and what it takes in.
+    """Pose and field of view of a level pinhole camera.
 
     Attributes:
         pose: In the world; it looks along its x axis.
@@ -53,7 +53,7 @@ class Viewpoint:
 
     @property
     def place(self) -> FloatArray:
-        """Where it is in the world, shape (3,)."""
+        """Its position in the world, shape (3,)."""
         return np.array([self.pose.x, self.pose.y, self.height_m])
 
     def with_finer_pixels(self, factor: int) -> "Viewpoint":
@@ -93,7 +93,7 @@ def widen(edges: FloatArray) -> FloatArray:
 def find_in_view(
     centres: FloatArray, radii_m: FloatArray, viewpoint: Viewpoint
 ) -> NDArray[np.bool_]:
-    """Tell which balls, with centres of shape (n, 3), touch the view."""
+    """Return True for balls, with centres of shape (n, 3), that touch the view."""
     half_fov = viewpoint.horizontal_fov_rad / 2
     half_rise = math.atan(math.tan(half_fov) * viewpoint.height_px / viewpoint.width_px)
     right, down, ahead = _in_camera(centres, viewpoint)
@@ -133,7 +133,7 @@ def _is_in_view(homogeneous: FloatArray, viewpoint: Viewpoint) -> NDArray[np.boo
 
 
 def _bound(homogeneous: FloatArray, viewpoint: Viewpoint) -> FloatArray:
-    """Return the bounds of what lies beyond the near plane, cut to the picture."""
+    """Return the bounds of the part beyond the near plane, clipped to the picture."""
     following = np.roll(homogeneous, -1, axis=1)
     depth, next_depth = homogeneous[..., 2], following[..., 2]
     crosses = (depth < NEAR_M) != (next_depth < NEAR_M)
@@ -154,12 +154,12 @@ NOTHING = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visibility:
-    """What each pixel shows.
+    """The visible triangle at each pixel.
 
     Attributes:
-        triangles: Which triangles of the scene may be seen, shape (n,).
+        triangles: Indices of the scene's triangles that may be visible, shape (n,).
         edges: Their edge functions, as `project` returns them, shape (n, 3, 3).
-        rows: Which of these each pixel shows, shape (height, width); -1 for nothing.
+        rows: Index into these at each pixel, shape (height, width); -1 for nothing.
         inverse_depth: One over the depth along the optical axis, 1/m, likewise; 0 for nothing.
     """
 
@@ -188,7 +188,7 @@ class _Pairs:
 
 
 def look(scene: Scene, viewpoint: Viewpoint) -> Visibility:
-    """Return what each pixel of a view shows."""
+    """Return the visible triangle at each pixel of a view."""
     in_view = find_in_view(scene.group_centres, scene.group_radii_m, viewpoint)
     chosen = np.flatnonzero(in_view[scene.groups])
     triangles, edges, bounds_px = project(scene.triangles.corners[chosen], viewpoint)
@@ -221,7 +221,7 @@ def _pair_with_tiles(bounds_px: FloatArray) -> _Pairs:
 
 
 def _compare_tiles(pairs: _Pairs, edges: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell which tiles do not lie wholly beyond an edge, and which their triangle covers."""
+    """Return which tiles are not wholly beyond an edge, and which their triangle covers."""
     touches = np.ones(len(pairs.rows), dtype=bool)
     covers = touches.copy()
     for i in range(3):

@@ -1,4 +1,4 @@
-"""A world as triangles with drawn surfaces and light: what the camera looks at."""
+"""A world as triangles with drawn surfaces and light, for the camera."""
 
 import math
 from collections.abc import Sequence

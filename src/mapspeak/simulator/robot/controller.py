@@ -1,6 +1,6 @@
-"""From a path to velocities: pure pursuit (Coulter, 1992), held to what the latest scan allows.
+"""Follow a path by pure pursuit (Coulter, 1992), limited by the latest scan.
 
-Obstacles are in the robot's own frame, so no error of the map or of the pose comes in.
+Obstacles are in the robot's own frame, so errors of map and pose have no effect.
 """
 
 import math
@@ -25,9 +25,9 @@ FloatArray = NDArray[np.float64]
 _NEAR_M = 2.5
 """Points further away than this cannot be touched before the next scans."""
 KEEP_OFF_M = 0.03
-"""How far the body's edge stays from a point, three times the LiDAR's noise."""
+"""Distance of the body's edge from a point, three times the LiDAR's noise."""
 _SQUEEZE_M = 0.01
-"""How near it may pass where it stands nearer than that already."""
+"""Distance to pass at if the robot is already nearer than that."""
 _REACTION_S = 0.25
 _ASIDES_RAD = tuple(
     math.copysign(math.radians(degrees), side) for degrees in range(15, 106, 15) for side in (1, -1)
@@ -37,7 +37,7 @@ _N_SAMPLES = 6
 
 
 class Obstacles:
-    """The points of a scan near the robot, as it stands now."""
+    """The points of a scan near the robot's present pose."""
 
     def __init__(self, points_in_base: FloatArray) -> None:
         near = np.einsum("ij,ij->i", points_in_base, points_in_base) < _NEAR_M**2
@@ -50,12 +50,12 @@ class Obstacles:
 
     @property
     def room_m(self) -> float:
-        """How much room the body's edge has to the nearest point."""
+        """Distance from the body's edge to the nearest point."""
         return self._nearest_m - BODY_RADIUS_M
 
     @cached_property
     def _nearest_m(self) -> float:
-        """How far the nearest point is from the body's centre."""
+        """Distance from the body's centre to the nearest point."""
         if not len(self._points):
             return math.inf
         x, y = self._points.T
@@ -74,7 +74,7 @@ class Obstacles:
     def sidestep(self, target: Point) -> Point:
         """Return the point as far away as the target, in the direction nearest to it, that is free.
 
-        Where no direction is, it is the target itself.
+        If no direction is free, return the target itself.
         """
         distance, bearing = math.hypot(target.x, target.y), math.atan2(target.y, target.x)
         for aside in _ASIDES_RAD:
@@ -87,8 +87,8 @@ class Obstacles:
     def limit(self, wanted: BodyVelocity) -> BodyVelocity:
         """Return the fastest motion on the wanted arc that can still stop before touching anything.
 
-        The arc stays the same, the speed is a share of what is wanted. Where none will do, only
-        the turn is left, which a round body may always make.
+        The arc stays the same, the speed is a share of the wanted one. If no share is safe, only
+        the turn remains, which is always safe for a round body.
         """
         if wanted.speed_mps == 0 or not len(self._points):
             return wanted
@@ -126,7 +126,7 @@ _COMFORT_MPS2 = 0.5
 _LOOKAHEADS_M = (0.8, 0.6, 0.45, 0.3, 0.15)
 _LOOKAHEAD_S = 0.9
 _LEAST_LOOKAHEAD_M = 0.3
-"""Where the way is free, no nearer point is aimed at, so that the robot does not waver."""
+"""Least lookahead on a free way, so that the robot does not waver."""
 _ROOMY_M = 0.4
 """With less room than this around its edge the robot slows down."""
 
@@ -134,7 +134,7 @@ _TURN_FIRST_RAD = 1.0
 """A path that starts more than this to the side is turned to on the spot."""
 _TURNED_RAD = 0.1
 _NARROW_M = 0.12
-"""With less room than this an arc would touch what a turn and a straight line pass."""
+"""With less room than this an arc would touch obstacles that turn and straight line avoid."""
 _TURN_FIRST_IF_NARROW_RAD = 0.25
 
 _ARRIVED_M = 0.08
@@ -157,12 +157,12 @@ class PathFollower:
 
     @property
     def distance_left_m(self) -> float:
-        """Along the path from where the robot was last seen on it."""
+        """Remaining path length from the robot's last position on it."""
         return (len(self._points) - 1 - self._at) * _STEP_M
 
     @property
     def points_left(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-        """The path from where the robot was last seen on it, a point every 5 cm."""
+        """The path from the robot's last position on it, a point every 5 cm."""
         return self._points[self._at :]
 
     def has_arrived(self, pose: Pose) -> bool:
@@ -195,8 +195,7 @@ class PathFollower:
     def _choose_target(self, pose: Pose, speed_mps: float, obstacles: Obstacles) -> Point:
         """Return the furthest point to aim at, in the robot's frame, with a free straight way.
 
-        Where there is none, the robot stands nearer to something than the path does, and steps
-        around it.
+        If there is none, the robot is nearer to an obstacle than the path, and steps around it.
         """
         base_from_map = pose.inverse()
         wanted = max(_LOOKAHEAD_S * speed_mps, _LEAST_LOOKAHEAD_M)

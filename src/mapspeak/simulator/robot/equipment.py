@@ -1,7 +1,7 @@
-"""What the robot can do besides driving: a battery and its dock, doors, a forklift, a voice.
+"""The robot's skills besides driving: a battery and its dock, doors, a forklift, a voice.
 
-The robot senses what is near, as by a beacon at a dock or the radio of a door: everything here goes
-by where it truly stands, and tells no pose of the world.
+The robot senses what is near, as by a beacon at a dock or the radio of a door: everything here uses
+its true pose, and reveals no pose of the world.
 """
 
 import math
@@ -14,7 +14,7 @@ from mapspeak.simulator.worlds.world import World, WorldDoor, WorldObject
 
 DOCK, PALLET, FORKLIFT = "charging_dock", "pallet", "forklift"
 DOCK_REACH_M = 2.5
-"""So far off a dock's beacon is heard."""
+"""Range of a dock's beacon."""
 DOOR_REACH_M = 1.8
 PALLET_REACH_M = 1.8
 """From the robot's middle to that of a door or a pallet."""
@@ -23,30 +23,30 @@ STAND_OFF_M = 0.65
 CONTACT_M, CONTACT_RAD = 0.2, 0.35
 LIFTED_M = 1.0
 DRIVING_HOURS, STANDING_HOURS, CHARGING_HOURS = 8.0, 24.0, 0.2
-"""What a full battery lasts for, and how long an empty one takes to be full."""
+"""Endurance of a full battery when driving and standing, and time for a full charge."""
 
 
 @dataclass(frozen=True, slots=True)
 class Deed:
-    """Something that was done, as it is kept for scoring."""
+    """A completed action, kept for scoring."""
 
     skill: str
     what: str
 
     def __str__(self) -> str:
-        """Return it as a state log has it."""
+        """Return it in the format of the state log."""
         return f"{self.skill}: {self.what}"
 
 
 class Equipment:
-    """The state of all that can be used.
+    """State of all equipment.
 
     Args:
-        change: Called with the world as it is after something in it was moved.
+        change: Called with the new world after something in it was moved.
 
     Attributes:
         charge_ratio: Of the battery.
-        deeds: All that was done, in its order.
+        deeds: All completed actions, in order.
     """
 
     def __init__(self, world: World, body: RobotBody, change: Callable[[World], None]) -> None:
@@ -58,7 +58,7 @@ class Equipment:
         self._n_faults_left = dict(world.n_faults)
 
     def pass_time(self, duration_s: float) -> None:
-        """Drain the battery, or charge it where the robot stands at a dock."""
+        """Drain the battery, or charge it if the robot is at a dock."""
         is_standing = self._body.velocity.speed_mps == 0
         hours = STANDING_HOURS if is_standing else DRIVING_HOURS
         if is_standing and self.dock_in_contact() is not None:
@@ -67,7 +67,7 @@ class Equipment:
         self.charge_ratio = min(max(ratio, 0.0), 1.0)
 
     def has_fault(self, skill: str) -> bool:
-        """Return True for the first times of a skill that the world says is out of order."""
+        """Return True for the first uses of a skill that the world declares out of order."""
         n_left = self._n_faults_left.get(skill, 0)
         self._n_faults_left[skill] = max(n_left - 1, 0)
         if n_left:
@@ -75,7 +75,7 @@ class Equipment:
         return n_left > 0
 
     def note(self, skill: str, what: str) -> None:
-        """Keep what was done."""
+        """Record a completed action."""
         self.deeds.append(Deed(skill, what))
 
     # --- the dock ---
@@ -105,7 +105,7 @@ class Equipment:
         return min(near, key=lambda door: door.pose.point.distance_to(here), default=None)
 
     def open_door(self, door: WorldDoor) -> None:
-        """Open a door: what its leaf stood in the way of is free."""
+        """Open a door: its leaf no longer blocks the way."""
         opened = replace(door, is_shut=False)
         doors = tuple(opened if each.name == door.name else each for each in self._world.doors)
         self._put(replace(self._world, doors=doors))

@@ -35,7 +35,7 @@ _SUBCELL_BITS = 6
 
 
 class LogOddsMap:
-    """A grid around the place where the robot first stood, which is (0, 0) of the map frame."""
+    """A grid around the robot's first position, which is (0, 0) of the map frame."""
 
     def __init__(self) -> None:
         self._log_odds = np.zeros((2 * _GROWTH_CELLS, 2 * _GROWTH_CELLS), dtype=np.float32)
@@ -52,10 +52,10 @@ class LogOddsMap:
     def of(cls, known: OccupancyGrid) -> Self:
         """Return a map as SLAM would hold it; its surfaces lie in the middles of their cells.
 
-        What is solid and not beside free floor is the inside of a wall and no surface.
+        Solid cells not beside free floor are the inside of a wall, not a surface.
 
         Raises:
-            MapError: Its cells are not those of SLAM: of another size, turned, or shifted.
+            MapError: Its cells differ from those of SLAM: in size, turned, or shifted.
         """
         shift = np.array([known.origin.x, known.origin.y]) / CELL_SIZE_M
         is_like_ours = math.isclose(known.resolution_m, CELL_SIZE_M, rel_tol=1e-6)
@@ -85,7 +85,7 @@ class LogOddsMap:
 
     @property
     def occupied(self) -> Mask:
-        """True where something more likely stands than not."""
+        """True where an obstacle is more likely than not."""
         return self._log_odds > 0
 
     @property
@@ -109,12 +109,12 @@ class LogOddsMap:
         )
 
     def insert(self, ends_in_map: FloatArray, is_return: Mask) -> None:
-        """Mark what one scan saw: surfaces, and the floor between them and the LiDAR.
+        """Mark one scan: surfaces, and the floor between them and the LiDAR.
 
         Args:
             ends_in_map: Where the beams end, in the order of their angles, shape (n, 2); a beam
                 without a return ends at the LiDAR itself.
-            is_return: True for the beams that ended at something, shape (n,).
+            is_return: True for the beams that hit something, shape (n,).
         """
         self._grow_to_hold(ends_in_map)
         ends = self.fractional_cells(ends_in_map)
@@ -217,7 +217,7 @@ def _shape_of(window: Window) -> tuple[int, int]:
 
 
 def _join(one: Window, other: Window) -> Window:
-    """Return the least window that holds two."""
+    """Return the smallest window that holds two others."""
     rows, cols = (
         slice(min(mine.start, its.start), max(mine.stop, its.stop))
         for mine, its in zip(one, other, strict=True)

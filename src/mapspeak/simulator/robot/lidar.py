@@ -50,12 +50,12 @@ class LidarScan:
 
     @property
     def is_return(self) -> NDArray[np.bool_]:
-        """True for the beams that met something."""
+        """True for the beams that hit something."""
         return np.isfinite(self.ranges_m)
 
     @property
     def n_returns(self) -> int:
-        """How many beams met something."""
+        """Number of beams that hit something."""
         return int(self.is_return.sum())
 
     @property
@@ -82,7 +82,7 @@ class Lidar:
         self._edges = solids.edges
 
     def scan(self, world_from_base: Pose, *, stamp_s: float) -> LidarScan:
-        """Measure from where the robot truly stands."""
+        """Measure from the robot's true pose."""
         ranges = measure_ranges(self._edges, world_from_base)
         ranges += self._random.normal(0.0, NOISE_M, N_BEAMS)
         ranges[(ranges < MIN_RANGE_M) | (ranges > MAX_RANGE_M)] = np.inf
@@ -90,11 +90,11 @@ class Lidar:
 
 
 def measure_ranges(edges: FloatArray, world_from_base: Pose) -> FloatArray:
-    """Return the exact distance along each of the 720 beams; infinite where a beam meets nothing.
+    """Return the exact distance along each of the 720 beams; infinite without a hit.
 
     Args:
         edges: As in `Slice.edges`.
-        world_from_base: Where the LiDAR stands.
+        world_from_base: Pose of the LiDAR.
     """
     ranges = np.full(N_BEAMS, np.inf)
     starts, along = _edges_in_base(edges, world_from_base)

@@ -23,7 +23,7 @@ _SLACK_M = 0.06
 """A path stays good while the map lacks no more than this of the radius it was planned with."""
 
 _UNDER_ROBOT_POINTS = 8
-"""So many points of a path, one every 5 cm, are not looked at anew: the robot is all but there."""
+"""The first points of a path, one every 5 cm, are not checked again: the robot is nearly there."""
 
 _PATIENCE_S = 6.0
 """Longer than it takes to turn right round on the spot."""
@@ -37,7 +37,7 @@ _LOOK_AROUND_S = 2.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Senses:
-    """What the robot knows at one moment.
+    """The robot's knowledge at one moment.
 
     Attributes:
         pose: By SLAM, in the map frame.
@@ -65,12 +65,12 @@ class Navigator:
         self._recovery: tuple[BodyVelocity, float] | None = None
         """A motion to get free, and when it ends."""
         self._milestone: tuple[float, float] | None = None
-        """How near the robot had come to its goal along the path, and when."""
+        """Least remaining path length so far, and its time."""
         self._status = GoalStatus(state=GoalState.CANCELLED)
 
     @property
     def status(self) -> GoalStatus:
-        """How the latest drive stands."""
+        """Status of the latest drive."""
         return self._status
 
     @property
@@ -115,7 +115,7 @@ class Navigator:
     # --- planning ---
 
     def _plan(self, senses: Senses, goal: Pose) -> None:
-        """Plan anew; without a way try to get free, and in the end give up."""
+        """Plan again; without a path try to get free, and finally give up."""
         path = self._find_path(senses, goal)
         if path is not None:
             self._follower = PathFollower(path, goal)
@@ -137,14 +137,14 @@ class Navigator:
             if path is not None:
                 self._planning_radius_m = radius
                 return path
-        # The gap by which it came in may lack a cell in the map's next state.
+        # The gap it entered by may lack a cell in the next map.
         ways = distances_from(
             senses.map, senses.pose.point, radius_m=_PLANNING_RADII_M[-1], leaves_pockets=True
         )
         return ways.path_to(goal.point)
 
     def _has_good_path(self, senses: Senses) -> bool:
-        """Look about once a second whether the map still shows the path as free."""
+        """Check about once a second whether the map still shows the path as free."""
         if self._follower is None:
             return False
         is_early = senses.now_s - self._checked_s < _CHECK_PERIOD_S
@@ -223,7 +223,7 @@ def _is_free_along(
     if not rows.size:
         return True
     rows, cols = rows.clip(0, grid.n_rows - 1), cols.clip(0, grid.n_cols - 1)
-    # What lies farther from the path than the radius takes no room from it.
+    # Obstacles farther from the path than the radius do not narrow it.
     margin = math.ceil(radius_m / grid.resolution_m) + 1
     around = grid.window(rows, cols, margin=margin)
     near = grid.crop(*around)

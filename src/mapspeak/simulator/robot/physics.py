@@ -1,4 +1,4 @@
-"""The drive, the wheels and the body: limits of speed, odometry that drifts, and what stops it."""
+"""The drive, the wheels and the body: speed limits, drifting odometry, and collisions."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ MAX_TURN_ACCELERATION_RADPS2 = 3.0
 
 @dataclass(frozen=True, slots=True)
 class BodyVelocity:
-    """How fast a differential drive moves: ahead, and turning left."""
+    """Velocity of a differential drive: forward, and turning left."""
 
     speed_mps: float = 0.0
     turn_radps: float = 0.0
@@ -67,7 +67,7 @@ class DifferentialDrive:
 
 
 class Odometry:
-    """Where the wheels say the robot is; it drifts with every metre and every turn.
+    """Wheel odometry; it drifts with every metre and every turn.
 
     Two errors add up, as in Borenstein and Feng, "Measurement and correction of systematic
     odometry errors in mobile robots" (1996): a systematic one that stays the same for a run (wheel
@@ -117,7 +117,7 @@ class Odometry:
 def _sinc(turns: float) -> float:
     """Return the chord of an arc as a share of its length, exact for straight lines too.
 
-    It is numpy's sinc to the last bit, without what that costs for a single number.
+    It equals numpy's sinc to the last bit, and is faster for a single number.
     """
     half = math.pi * turns or _LEAST
     return float(np.sin(half)) / half
@@ -134,15 +134,15 @@ def _clamp(value: float, most: float) -> float:
 _APART_M = 0.05
 """Before the robot is this far from a thing again, pushing at it is no new collision."""
 _NEAR_M = 1.0
-"""What is farther away than this touches no body in the next steps."""
+"""Obstacles farther away than this cannot touch the body in the next steps."""
 
 
 class RobotBody:
     """A round body on two driven wheels.
 
     Attributes:
-        world_from_base: Where it truly stands.
-        driven_m: How far its centre has moved.
+        world_from_base: Its true pose.
+        driven_m: Distance that its centre has moved.
     """
 
     def __init__(self, solids: Slice, start: Pose) -> None:
@@ -159,7 +159,7 @@ class RobotBody:
         return self._drive.velocity
 
     def stand_among(self, solids: Slice) -> None:
-        """Bump into what is solid from now on."""
+        """Collide with these solids from now on."""
         self._solids = solids
         self._near_from = self.world_from_base.point
         self._near = solids.near(self._near_from, reach_m=2 * _NEAR_M)
@@ -180,9 +180,9 @@ class RobotBody:
         return before.inverse() @ wanted
 
     def _room_m_at(self, point: Point) -> float:
-        """Return how far the body's edge would be from what is near; more than that, if nothing is.
+        """Return the distance of the body's edge to near obstacles; a larger value without any.
 
-        Most of a world is far away, and is not looked at in every step.
+        Most of a world is far away, and is not checked in every step.
         """
         if point.distance_to(self._near_from) > _NEAR_M:
             self._near = self._solids.near(point, reach_m=2 * _NEAR_M)

@@ -22,11 +22,11 @@ IntArray = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 _SPREAD_M = 0.10
-"""How far from a surface its likelihood has fallen to 0.6: about two cells."""
+"""Distance from a surface at which its likelihood falls to 0.6: about two cells."""
 _REACH_CELLS = 3
-"""How many cells around a point its surface is looked for."""
+"""Radius, in cells, of the search for the surface of a point."""
 _LINE_RATIO = 4.0
-"""How much longer than wide, in squares, a scatter must be to count as a line."""
+"""Least ratio of length to width, squared, of a scatter that counts as a line."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -58,7 +58,7 @@ class SurfaceField:
         return np.asarray(self._map.is_seen[self._cells(points_in_map, margin=0)])
 
     def find_lines(self, points_in_map: FloatArray) -> NearestLines:
-        """Find the surface near each point and fits a line to it."""
+        """Find the surface near each point and fit a line to it."""
         rows, cols, is_near = self._find_nearest(points_in_map)
         middles, normals, has_direction = self._fit_lines(rows, cols)
         away_m = (self._map.fractional_cells(points_in_map) - middles) * CELL_SIZE_M
@@ -191,11 +191,11 @@ _N_STEPS = 8
 _SMALL_STEP = 2e-4
 _LARGEST_STEP = 0.1
 _FIT_SPREAD_M = 0.03
-"""How far points scatter about their surface; those further off count for less and less."""
+"""Scatter of points about their surface; farther ones count less and less."""
 _INDEPENDENT_RATIO = 0.1
 """Neighbouring points lie on the same cells and share their errors: ten count as one."""
 _ODOMETRY_SPREAD = (0.05, 0.05, 0.03)
-"""How far odometry may be off between two updates: m, m, rad."""
+"""Error of odometry between two updates: m, m, rad."""
 
 _GOOD_SCORE_RATIO = 0.7
 _FEWEST_MAPPED_POINTS = 20
@@ -205,7 +205,7 @@ _SEARCH_TURN_RAD = 0.3
 _SEARCH_TURN_STEP_RAD = 0.02
 _N_SEARCH_POINTS = 120
 _SEARCH_DISTANCE_COST = 0.05
-"""What a metre, or a radian, away from the expected pose costs: it decides between equal fits."""
+"""Cost per metre, or radian, from the expected pose; it decides between equal fits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,13 +281,13 @@ def _linearise(
     arms = placed[lines.is_line] - (pose.x, pose.y)
     turning = normals[:, 1] * arms[:, 0] - normals[:, 0] * arms[:, 1]
     jacobian = np.column_stack([normals, turning])
-    # Cauchy's weights: what lies far off its surface has perhaps another one.
+    # Cauchy weights: a point far off its surface may belong to another one.
     weighted = _INDEPENDENT_RATIO * jacobian / (_FIT_SPREAD_M**2 + offsets**2)[:, None]
     return weighted.T @ jacobian, -weighted.T @ offsets
 
 
 def _score(field: SurfaceField, points_in_map: FloatArray) -> float | None:
-    # New ground must not count against a scan: most of what a door opens to is new.
+    # New ground must not count against a scan: most of the view through a new door is new.
     mapped = points_in_map[field.is_mapped(points_in_map)]
     if len(mapped) < _FEWEST_MAPPED_POINTS:
         return None

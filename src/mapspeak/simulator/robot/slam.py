@@ -1,12 +1,12 @@
-"""Where the robot is in a map: SLAM, which makes the map, and localisation in a finished one.
+"""SLAM, which makes the map, and localisation in a finished one.
 
 SLAM: the robot's first pose is (0, 0, 0) of the map frame. Between scans the pose follows odometry;
 now and then, as the robot moves, a scan is matched to the map and then added to it.
 
 Localisation is what AMCL and a map server are to a real robot. The robot is told roughly where it
 stands, as a person does with RViz's "2D Pose Estimate"; from then on it follows odometry and
-matches scans to the map, which never changes. What the scans show and the map does not is kept
-apart, as an obstacle layer of a costmap is, and planned around.
+matches scans to the map, which never changes. Obstacles in scans
+but not on the map are kept apart, like an obstacle layer of a costmap, and planned around.
 """
 
 import math
@@ -33,7 +33,7 @@ _LOWEST_SCORE_RATIO = 0.35
 """Below this a scan does not fit the map; it neither moves the robot nor marks the map."""
 
 _MAPPING_STEP = (0.15, 0.1)
-"""How far the robot drives, in metres, or turns, in radians, between two scans of the map."""
+"""Distance in metres, or turn in radians, between two scans of the map."""
 _FEWEST_RETURNS = 40
 """A scan with fewer returns places nothing; odometry goes on alone."""
 
@@ -43,19 +43,19 @@ _FIRST_GUESS_M = 0.1
 _FIRST_GUESS_RAD = 0.05
 """The spread of the pose that the robot is told at first."""
 _NEW_M = 0.25
-"""What is seen this far from everything on the map is new; less may be an error of the pose."""
+"""Hits this far from everything on the map are new; nearer ones may be errors of the pose."""
 _OBSTACLE_RANGE_M = 5.0
 """Farther returns mark nothing: there the error of the heading counts for too much."""
 _FEWEST_HITS = 3
-"""A cell is new once so many scans have hit it."""
+"""Number of hits from which a cell counts as new."""
 _OCCUPIED = 100
 
 
 class PoseTracker:
-    """A pose in the map that follows odometry, and that some of the scans correct.
+    """A pose in the map that follows odometry and is corrected by some of the scans.
 
     Args:
-        step: After so many metres, or so much turning in radians, the next scan is worth a look.
+        step: Metres, or radians of turning, after which the next scan is used.
     """
 
     def __init__(self, map_from_odom: Pose, *, step: tuple[float, float]) -> None:
@@ -67,7 +67,7 @@ class PoseTracker:
 
     @property
     def map_from_base(self) -> Pose:
-        """Where the robot believes it is."""
+        """The robot's estimated pose."""
         return self._map_from_odom @ self._odom_from_base
 
     def follow_odometry(self, odom_from_base: Pose) -> None:
@@ -116,7 +116,7 @@ class Mapper(PoseTracker):
         return None
 
     def forget_obstacles(self) -> None:
-        """Do nothing: what a map of its own shows goes when scans show it free."""
+        """Do nothing: scans clear obstacles from the robot's own map."""
 
     def add_scan(self, scan: LidarScan) -> None:
         """Match a scan to the map and add it, if the robot has moved enough to learn from it."""
@@ -136,12 +136,12 @@ class Mapper(PoseTracker):
 
 
 class Localiser(PoseTracker):
-    """The robot's place in a map that is known and stays as it is.
+    """Localisation in a known map that never changes.
 
     Args:
         known: The map; its frame is the map frame.
-        pose: Where the robot truly stands in it.
-        random: Of what it is told at first.
+        pose: The robot's true pose in it.
+        random: For the error of the first guess.
     """
 
     def __init__(self, known: OccupancyGrid, pose: Pose, *, random: np.random.Generator) -> None:
@@ -158,7 +158,7 @@ class Localiser(PoseTracker):
         return self._layer.grid
 
     def forget_obstacles(self) -> None:
-        """Forget what was seen besides the map, as a cleared costmap does."""
+        """Forget obstacles that are not on the map, as when a costmap is cleared."""
         self._layer = _ObstacleLayer(self._known)
 
     def add_scan(self, scan: LidarScan) -> None:
@@ -168,13 +168,13 @@ class Localiser(PoseTracker):
             self._layer.mark(place_points(self.map_from_base, near))
 
     def publish(self, *, stamp_s: float) -> OccupancyGrid:
-        """Return the known map, which is as old as it is."""
+        """Return the known map with its original stamp."""
         del stamp_s
         return self._known
 
 
 class _ObstacleLayer:
-    """What stands on floor that the map calls free."""
+    """Obstacles on floor that is free on the map."""
 
     def __init__(self, known: OccupancyGrid) -> None:
         self.grid = known
@@ -184,7 +184,7 @@ class _ObstacleLayer:
         self._n_hits = np.zeros(known.cells.shape, dtype=np.int16)
 
     def mark(self, points_in_map: FloatArray) -> None:
-        """Count what a scan shows on open floor."""
+        """Count the hits of a scan on open floor."""
         rows, cols = self.grid.cells_at(points_in_map)
         is_inside = self.grid.contains_cells(rows, cols)
         rows, cols = rows[is_inside], cols[is_inside]

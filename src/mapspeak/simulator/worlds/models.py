@@ -1,4 +1,4 @@
-"""What objects look like, and which of their parts the laser and the bumper feel.
+"""Models of objects: their looks, and the parts that the laser and the bumper detect.
 
 `models.json` lists every kind of object with its parts. A part is written as a shape with the
 arguments of the function of that name below; everything is in the object's own frame: x to the
@@ -60,7 +60,7 @@ class Surface(StrEnum):
 
 
 class ObjectCategory(StrEnum):
-    """How the paper's semantic filtering policy sorts a thing; what is often moved is "other"."""
+    """Class of a thing in the paper's semantic filtering policy; movable things are "other"."""
 
     SAFETY = "safety"
     FUNCTIONAL = "functional"
@@ -94,9 +94,9 @@ class Mesh:
         normals: The outward direction at each corner, of length 1, shape (n, 3, 3).
         uv: Where each corner lies on the surface, 0 to 1 from its upper left, shape (n, 3, 2).
         faces: Which face of the part each triangle belongs to, shape (n,); a face has no edges.
-        colour: Of the part; it tints a drawn surface.
-        surface: What is drawn on it; None for plain colour.
-        is_solid: The laser and the bumper feel it; False for labels and cables.
+        colour: Colour of the part; it tints a drawn surface.
+        surface: The drawing on it; None for plain colour.
+        is_solid: The laser and the bumper detect it; False for labels and cables.
     """
 
     corners: FloatArray
@@ -115,10 +115,10 @@ def kind_names() -> tuple[str, ...]:
 
 @cache
 def find_kind(name: str) -> ObjectKind:
-    """Return what there is to say about a kind.
+    """Return the description of a kind.
 
     Raises:
-        ConfigError: There is no kind of that name.
+        ConfigError: No kind has that name.
     """
     if name not in _read_models():
         raise ConfigError(

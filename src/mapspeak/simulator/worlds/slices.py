@@ -23,7 +23,7 @@ Contour = NDArray[np.float32]
 _SUBCELL_BITS = 6
 """Binary places of a pixel that OpenCV keeps when it fills an outline."""
 _FINER = 4
-"""Outlines are filled on so many times finer pixels: OpenCV fills each pixel that it touches."""
+"""Supersampling of filled outlines: OpenCV fills each pixel that an outline touches."""
 _CELL_BITS = _SUBCELL_BITS + 2
 """Binary places of a cell: those of a pixel, and two for the `_FINER` pixels."""
 _SMALLEST_AREA_M2 = 1e-5
@@ -220,7 +220,7 @@ def _find_hulls(parts: Iterable[Mesh], low_m: float, high_m: float) -> list[Cont
 
 
 def _points_between(corners: FloatArray, low_m: float, high_m: float) -> FloatArray:
-    """Return (x, y) of what spans the triangles' part between two heights."""
+    """Return (x, y) of points that span the part of the triangles between two heights."""
     points = corners.reshape(-1, 3)
     found = [points[(points[:, 2] >= low_m) & (points[:, 2] <= high_m)]]
     start = points

@@ -34,7 +34,7 @@ class WorldWall:
         return self.start.distance_to(self.end)
 
     def point_at(self, along_m: float) -> Point:
-        """Return the point of the centre line that is so far from the start."""
+        """Return the point of the centre line at a distance from the start."""
         return self.pose.transform(Point(along_m, 0.0))
 
 
@@ -56,7 +56,7 @@ class WorldDoor:
 
     @property
     def leaf(self) -> WorldWall:
-        """What stands in it while it is shut."""
+        """The leaf that fills it while it is shut."""
         half = self.width_m / 2
         start, end = (self.pose.transform(Point(side * half, 0.0)) for side in (-1, 1))
         return WorldWall(start=start, end=end, thickness_m=LEAF_M, height_m=LEAF_HEIGHT_M)

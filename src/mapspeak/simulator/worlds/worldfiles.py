@@ -35,7 +35,7 @@ from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import RoomClass
 
 _DOOR_REACH_M = 0.05
-"""How far beside a wall's centre line, beyond half its thickness, a door may be written."""
+"""Tolerance for a door beside a wall's centre line, beyond half the wall's thickness."""
 
 _IN_LINE_SINE = 0.02
 """The sine of the angle below which a wall counts as in line with a door."""
@@ -95,7 +95,7 @@ def _read_tree(tree: CommentedMap, label: str, stem: str) -> World:
 
 
 def read_world_text(name_or_path: str | Path) -> str:
-    """Return what a world's file says, word for word.
+    """Return the text of a world's file.
 
     Raises:
         ConfigError: There is no such world.

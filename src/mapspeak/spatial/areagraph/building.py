@@ -124,7 +124,7 @@ def _ring(grid: OccupancyGrid, vertices: VertexRing) -> Ring:
 
 
 def _points(grid: OccupancyGrid, vertices: tuple[Vertex, ...]) -> tuple[Point, ...]:
-    """Return the places of corners of cells; the grid speaks of cells by their centres."""
+    """Return the positions of cell corners; the grid's own conversion is for cell centres."""
     rows, cols = np.array(vertices).T - 0.5
     return tuple(
         Point(round(x, MICROMETRE_DECIMALS) + 0.0, round(y, MICROMETRE_DECIMALS) + 0.0)
@@ -136,7 +136,7 @@ def _choose_lines(borders: list[BorderRun], places: list[Place]) -> list[VertexL
     """Return the line of each door between two areas, in the order of the doors.
 
     Args:
-        borders: All that these two areas have in common, from one side.
+        borders: All common borders of these two areas, from one side.
         places: The middle of each door.
     """
     ends: list[list[Vertex]] = [[] for _ in places]
@@ -150,7 +150,7 @@ def _choose_lines(borders: list[BorderRun], places: list[Place]) -> list[VertexL
 
 
 def _runs(borders: list[BorderRun]) -> list[list[BorderRun]]:
-    """Return the borders that hang together."""
+    """Return the connected runs of borders."""
     at: defaultdict[Vertex, list[int]] = defaultdict(list)
     for index, border in enumerate(borders):
         at[border.start].append(index)
@@ -291,7 +291,7 @@ def _twice_area(ring: VertexRing) -> int:
 
 
 def _holds(ring: VertexRing, point: tuple[float, float]) -> bool:
-    """Tell by crossings whether a cell's centre lies in a ring."""
+    """Return True if a cell's centre lies in a ring, by counting crossings."""
     rows, cols = np.array(ring).T
     next_rows = np.roll(rows, -1)
     crosses = (rows > point[0]) != (next_rows > point[0])

@@ -6,7 +6,7 @@ Without an anchor, GeoJSON's coordinates are metres in the map frame, which RFC 
 osmAG is OpenStreetMap XML whose ways are areas and passages. The tags are those of the indoor
 osmAG standard (2025) in its "semantic" variant, in which passages name the areas they join; Hou,
 Feng, Zhang, Schwertfeger: "osmAG: Hierarchical Semantic Topometric Area Graph Maps in the OSM
-Format for Mobile Robotics". What osmAG has no word for stands in tags that begin with `mapspeak:`.
+Format for Mobile Robotics". Fields without an osmAG tag get tags that begin with `mapspeak:`.
 """
 
 import itertools
@@ -43,7 +43,7 @@ PositionOf = Callable[[Point], tuple[float, float]]
 
 
 class AreaRecord(BaseModel):
-    """What a file holds of an area."""
+    """An area as written in a file."""
 
     id: str
     label: int
@@ -61,7 +61,7 @@ class AreaRecord(BaseModel):
     polygons: list[PolygonPositions]
 
     def to_area(self) -> Area:
-        """Return the area that the polygon tells of."""
+        """Return the area of the polygon."""
         region = Region(
             id=self.id,
             index=self.label,
@@ -254,7 +254,7 @@ Tags = Mapping[str, str]
 
 
 def to_osm(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
-    """Return the area graph as osmAG; to JOSM all elements are new ones that no server knows.
+    """Return the area graph as osmAG; in JOSM all elements are new, unknown to any server.
 
     Args:
         anchor: Where on Earth the map lies; without one, its (0, 0) is put at latitude 0,
@@ -276,7 +276,7 @@ def to_osm(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
 
 
 class _OsmWriter:
-    """Gives out ids, one node for each point, so that neighbours share their corners."""
+    """Assigns ids, one node per point, so that neighbours share their corners."""
 
     def __init__(self, name: str, anchor: MapAnchor) -> None:
         self.nodes: list[ET.Element] = []
@@ -296,7 +296,7 @@ class _OsmWriter:
             "level": "0",
             "name": area.id,
             "osmAG:type": "area",
-            # To osmAG an open space is a room.
+            # osmAG treats an open space as a room.
             "osmAG:areaType": "corridor" if region.room_class is RoomClass.CORRIDOR else "room",
         } | _own_tags(_facts_of_area(area))
         if not area.polygons:

@@ -1,4 +1,4 @@
-"""What an area graph is: areas with outlines, joined by passages, and where on Earth it lies."""
+"""The area graph: areas with outlines, joined by passages, and its anchor on Earth."""
 
 import math
 import re
@@ -17,18 +17,18 @@ Ring = tuple[Point, ...]
 Line = tuple[Point, Point]
 
 MICROMETRE_DECIMALS = 6
-"""Outlines and lines are whole micrometres: so they survive the way through degrees and back."""
+"""Outlines and lines are whole micrometres, so that conversion to degrees and back is exact."""
 
 _ID = re.compile(r"[\w.-]+")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polygon:
-    """A piece of floor in one part.
+    """A connected piece of floor.
 
     Attributes:
         outer: Its outline, counter-clockwise.
-        holes: The outlines of what does not belong to it, clockwise.
+        holes: The outlines of excluded parts, clockwise.
     """
 
     outer: Ring
@@ -63,8 +63,8 @@ class Area:
     """A node of the graph: a region with its outline.
 
     Attributes:
-        polygons: Where it lies; several when it is cut into parts, the largest first.
-        text: What people read about it; files call it its `reason`.
+        polygons: Its parts, the largest first.
+        text: Description for people; files call it `reason`.
     """
 
     region: Region
@@ -79,7 +79,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Passage:
-    """An edge of the graph: a door with the line that one crosses there.
+    """An edge of the graph: a door with the line to cross.
 
     Attributes:
         line: From post to post: the ends of the border that its two areas share there, which are
@@ -100,8 +100,8 @@ class AreaGraph:
     """Areas joined by passages, in metres in the map frame.
 
     Raises:
-        MapError: Ids are not unique, passages lead nowhere, areas name other doors than those that
-            join them, or a text holds control characters.
+        MapError: Ids are not unique, passages lead nowhere, areas name doors that do not join
+            them, or a text holds control characters.
     """
 
     name: str
@@ -120,7 +120,7 @@ class AreaGraph:
         _check_passages(self)
 
     def passages_by_area(self) -> Mapping[str, tuple[Passage, ...]]:
-        """Return for every area the passages that lead out of it: the graph as adjacency."""
+        """Return the passages of every area: the graph as adjacency lists."""
         found: dict[str, list[Passage]] = {area.id: [] for area in self.areas}
         for passage in self.passages:
             for area_id in passage.door.region_ids:
@@ -188,11 +188,11 @@ class LatLon:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapAnchor:
-    """Where on Earth the map frame's (0, 0) lies, and where its x axis points.
+    """Position of the map frame's (0, 0) on Earth, and direction of its x axis.
 
-    The conversion is the flat one around the anchor, with the radii of curvature of the WGS 84
-    ellipsoid there. Meridians converge, which it leaves out: x y tan(latitude) / 6.4e6 m, or 2 cm
-    at 300 m and 0.3 m at 1 km from an anchor at 60 degrees.
+    The conversion is flat around the anchor, with the radii of curvature of the WGS 84 ellipsoid
+    there. It neglects the convergence of meridians: x y tan(latitude) / 6.4e6 m, or 2 cm at 300 m
+    and 0.3 m at 1 km from an anchor at 60 degrees.
 
     Attributes:
         lat_deg: WGS 84 latitude of (0, 0), from -85 to 85.
@@ -200,7 +200,7 @@ class MapAnchor:
         yaw_rad: Direction of the x axis, counter-clockwise from east (REP 103).
 
     Raises:
-        MapError: It is no such place.
+        MapError: A value is out of range.
     """
 
     lat_deg: float = 0.0
@@ -218,14 +218,14 @@ class MapAnchor:
 
     @property
     def yaw_deg(self) -> float:
-        """The direction of the x axis as files and people say it."""
+        """The direction of the x axis in degrees, for files and people."""
         return round(math.degrees(self.yaw_rad), 12)
 
     def locate(self, point: Point) -> LatLon:
         """Return the place on Earth of a point of the map, to a hundredth of a micrometre.
 
         Raises:
-            MapError: It is so far from the anchor that degrees run out.
+            MapError: It is too far from the anchor to have a latitude and longitude.
         """
         east, north = self._metres_per_degree()
         turned = Pose(0.0, 0.0, self.yaw_rad).transform(point)

@@ -1,4 +1,4 @@
-"""Where known floor meets the unknown, and where to go to look beyond."""
+"""Frontiers between known floor and the unknown, and viewpoints to look beyond them."""
 
 from mapspeak.spatial.frontiers.frontier import (
     Frontier,

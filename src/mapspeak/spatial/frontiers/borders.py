@@ -1,4 +1,4 @@
-"""The cells where known floor meets the unknown, gathered into borders, and how to get to them."""
+"""Group cells where known floor meets the unknown into borders; find ways to them."""
 
 import math
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ from mapspeak.spatial.grid import IntArray, OccupancyGrid
 from mapspeak.spatial.paths.distances import DistanceField
 
 THINNEST_UNKNOWN_M = 0.15
-"""Thinner unknown is what lies between two beams of a LiDAR, or along a wall: nothing to see."""
+"""Thinner unknown is a gap between two LiDAR beams, or along a wall: nothing to see."""
 
 JOIN_M = 0.6
-"""Pieces of border that are no further apart on the floor are one."""
+"""Pieces of border no further apart on the floor belong together."""
 
 PLUS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
@@ -25,7 +25,7 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Border:
-    """Free cells beside the unknown that hang together."""
+    """Connected free cells beside the unknown."""
 
     rows: IntArray
     cols: IntArray
@@ -33,7 +33,7 @@ class Border:
 
 
 def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[Border, ...], int]:
-    """Find borders of the known floor with unknown that is worth a look; count the shorter ones.
+    """Find borders of the known floor with unknown worth a look; count the shorter ones.
 
     Only cells that touch by a side count as neighbours, so that nothing is seen between walls
     that touch at a corner. Outside the array everything is unknown.
@@ -60,13 +60,13 @@ def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[B
 
 
 def find_middle(rows: IntArray, cols: IntArray) -> int:
-    """Return which of some cells is nearest to their mean."""
+    """Return the index of the cell nearest to the mean of all."""
     off_rows, off_cols = rows - rows.sum() / rows.size, cols - cols.sum() / cols.size
     return int((off_rows * off_rows + off_cols * off_cols).argmin())
 
 
 def _edge(unknown: Picture, free: Picture, *, side: int) -> Picture:
-    """Return True in free cells that have unknown at a side, and not just a sliver of it."""
+    """Return True in free cells with more than a sliver of unknown at a side."""
     square = np.ones((side, side), dtype=np.uint8)
     thick = np.asarray(cv2.erode(unknown, square, anchor=(0, 0)), dtype=np.uint8)
     # One dilation gives the squares of unknown back and looks as far around them again.
@@ -106,11 +106,11 @@ def _lengths(rows: IntArray, cols: IntArray, starts: IntArray) -> NDArray[np.flo
 WIDTH_STEP_M = 0.1
 """Gaps are measured in steps of this."""
 ROUNDING_CELLS = 2
-"""By so much the reachable floor of a large map may be off, as its cells are joined."""
+"""Error of the reachable floor of a large map, whose cells are joined two by two."""
 
 
 def find_parts_beyond(distances: DistanceField, borders: Sequence[Border]) -> list[Border | None]:
-    """Find of each border the part where the robot does not fit; None where it is the lesser part.
+    """Find the part of each border where the robot does not fit; None if it is the lesser part.
 
     The body of a robot that drives wherever it can covers all floor but slits, what lies behind
     them, and corners, which are no deeper than that of a right angle.
@@ -129,17 +129,17 @@ def find_parts_beyond(distances: DistanceField, borders: Sequence[Border]) -> li
 
 
 def find_gap_widths_m(distances: DistanceField, borders: Sequence[Border]) -> list[float | None]:
-    """Find for each border how wide the widest way to it is at its narrowest; None without a way.
+    """Find for each border the bottleneck width of the widest way to it; None without a way.
 
-    The floor is taken in that has so much room around it, step by step more; a border hangs
-    together with where the robot is until its way is too narrow.
+    Floor with less clearance is removed step by step; a border stays connected to the robot until
+    its way is too narrow.
     """
     widths_m: list[float | None] = [None] * len(borders)
     joined = list(range(len(borders))) if distances.reachable.any() else []
     for width_m in np.arange(0.0, 2 * distances.radius_m - 1e-9, WIDTH_STEP_M):
         if not joined:
             break
-        # The pieces of floor that are nowhere narrower, and where the robot is.
+        # The pieces of floor that are nowhere narrower, and the robot's position.
         wide = distances.grid.free & (distances.clearances_m >= width_m / 2 - 1e-6)
         wide |= distances.reachable
         _, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)

@@ -11,15 +11,15 @@ from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms.identity import match_best_first
 
 TOUCH_M = 0.3
-"""Points of one frontier on two maps are no further apart."""
+"""Points of one frontier on two maps are at most this far apart."""
 SAME_PLACE_M = 2.0
-"""An id that led farther than this from where it did would mislead."""
+"""A frontier that moved farther than this gets a new id."""
 SAME_RATIO = 0.25
 """Two frontiers are one when this share of the shorter lies on the other."""
 
 
 class FrontierMerit(StrEnum):
-    """What sets a frontier apart from the others."""
+    """Merits that distinguish a frontier from the others."""
 
     ONLY = "only"
     BEST = "best"
@@ -35,13 +35,13 @@ class Frontier:
     Attributes:
         id: Such as "F2"; the same from call to call while the frontier exists.
         points: The centres of its cells in metres, shape (n, 2).
-        anchor: The one of them that the pose looks over.
-        gain_m2: Unknown floor that is to be expected to come into view at the pose.
+        anchor: The point that the pose looks over.
+        gain_m2: Unknown floor expected to come into view at the pose.
         distance_m: From the robot to the pose, by path.
-        openness_m: What that was reckoned with: how far one sees on this map, on average.
-        pose: Where to go: a place the robot can reach and stand in, facing the unknown.
-        detour_m: By how much the round through all grows that begins with it; None where that was
-            not computed, because others promise more.
+        openness_m: Mean viewing distance on this map, used for the gain.
+        pose: The viewpoint: the robot can reach it and faces the unknown there.
+        detour_m: Growth of the round through all frontiers if it begins with this one; None if not
+            computed, because others promise more.
     """
 
     id: str
@@ -62,26 +62,26 @@ class Frontier:
 
 
 class RefusalReason(StrEnum):
-    """Why a border with the unknown is no place to go."""
+    """Reason for refusing a border with the unknown."""
 
     NO_WAY = "no_way"
     TOO_NARROW = "too_narrow"
     NOTHING_TO_SEE = "nothing_to_see"
     LOOKED_ALREADY = "looked_already"
     CLOSED_OFF = "closed_off"
-    """No way while areas are closed."""
+    """No way leads there while areas are closed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RefusedFrontier:
-    """A border with the unknown that is no place to go.
+    """A border with the unknown that is refused as a goal.
 
     Attributes:
         anchor: One of its cells, near its middle.
-        gap_width_m: Where it is too narrow: how wide the way is at its narrowest.
-        needed_width_m: Where it is too narrow: how wide the robot is.
-        gain_m2: Where there is nothing to see: how much there is.
-        least_gain_m2: Where there is nothing to see: how much is worth a drive.
+        gap_width_m: Width of the way at its narrowest, if too narrow.
+        needed_width_m: Width of the robot, if the way is too narrow.
+        gain_m2: Expected gain, if there is too little to see.
+        least_gain_m2: Gain worth a drive, if there is too little to see.
     """
 
     anchor: Point
@@ -94,7 +94,7 @@ class RefusedFrontier:
 
 
 class FrontierVerdict(StrEnum):
-    """What is left to explore."""
+    """State of exploration."""
 
     SOME_LEFT = "some_left"
     NONE_LEFT = "none_left"
@@ -105,7 +105,7 @@ class FrontierVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WaysBetween:
-    """How far it is from frontier to frontier.
+    """Distances between frontiers.
 
     Attributes:
         metres: By path, shape (n, n).
@@ -120,10 +120,10 @@ class FrontierReport:
     """All frontiers of a map as seen from one place.
 
     Attributes:
-        frontiers: Where to go, best first.
-        refused: Where not to go, longest first.
-        ways: Between those that were weighed against each other; they hold while the map does.
-        n_named: The highest number given to a frontier so far; the next new one gets one more.
+        frontiers: Possible goals, best first.
+        refused: Refused borders, longest first.
+        ways: Between the frontiers that were compared; valid for this map.
+        n_named: The highest frontier number given so far.
     """
 
     frontiers: tuple[Frontier, ...]
@@ -133,12 +133,12 @@ class FrontierReport:
     ways: WaysBetween | None = None
 
     def find(self, frontier_id: str) -> Frontier | None:
-        """Find a frontier by its id; None where it is gone or was never there."""
+        """Find a frontier by its id; None if it is gone or never existed."""
         return next((each for each in self.frontiers if each.id == frontier_id), None)
 
 
 def match_frontiers(previous: FrontierReport, current: FrontierReport) -> FrontierReport:
-    """Return the current report with the ids of the previous one where a frontier still exists.
+    """Return the current report with the previous ids of frontiers that still exist.
 
     Frontiers are compared by where they lie in the world, so the map may grow and move its origin
     in between. New ones get numbers that were never given before.

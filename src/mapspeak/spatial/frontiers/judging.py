@@ -1,4 +1,4 @@
-"""Frontiers of a map: which borders with the unknown are places to go, and why others are not."""
+"""Judge borders with the unknown: which are frontiers to go to, and why others are refused."""
 
 import dataclasses
 import itertools
@@ -32,9 +32,9 @@ from mapspeak.spatial.grid import Cell, OccupancyGrid
 from mapspeak.spatial.paths.distances import DistanceField, distances_from
 
 LOOKED_NEAR_M = 0.4
-"""A robot that has looked from this near to a pose has looked from there."""
+"""A robot this near to a pose counts as having looked from there."""
 NOISE_M = 0.8
-"""A shorter border is narrower than any doorway: where it is no place to go, it is not listed."""
+"""Shorter borders are narrower than any doorway and are not listed when refused."""
 
 
 def find_frontiers(
@@ -45,12 +45,12 @@ def find_frontiers(
     distances: DistanceField | None = None,
     looked_from: Sequence[Point] = (),
 ) -> FrontierReport:
-    """Find where the robot can go to see more, best first, and what is refused and why.
+    """Find goals where the robot can see more, best first, and refused borders with reasons.
 
     Args:
-        distances: From that position on that map, where they are known already.
-        looked_from: Poses of frontiers that the robot has been to: what is still unknown from
-            there cannot be seen, and is refused instead of being offered for ever.
+        distances: From that position on that map, if already known.
+        looked_from: Poses of frontiers that the robot has visited: what remains unknown from
+            there cannot be seen, and is refused instead of being offered forever.
     """
     if distances is None:
         distances = distances_from(grid, position, radius_m=radius_m)
@@ -74,10 +74,10 @@ def rerank_frontiers(report: FrontierReport, distances: DistanceField) -> Fronti
 
     Args:
         report: Of the map that the distances belong to.
-        distances: From where the robot is now.
+        distances: From the robot's present position.
 
     Returns:
-        The report in its new order; None where a frontier cannot be reached from there.
+        The report in its new order; None if a frontier cannot be reached from there.
     """
     moved = []
     for frontier in report.frontiers:
@@ -156,7 +156,7 @@ def _without_looked(
 def _find_poses(
     distances: DistanceField, borders: Sequence[tuple[Border, list[FrontierViewpoint]]]
 ) -> list[Frontier]:
-    """Return borders with the pose at the viewpoint that shows most per metre of way to it."""
+    """Return borders with the pose at the viewpoint with the largest gain per metre of way."""
     grid = distances.grid
     viewpoints = [viewpoint for _, own in borders for viewpoint in own]
     cells = [viewpoint.cell for viewpoint in viewpoints]
@@ -199,7 +199,7 @@ def _refuse(
 
 
 def _refuse_cut_off(distances: DistanceField, borders: Sequence[Border]) -> list[RefusedFrontier]:
-    """Refuse borders that no viewpoint is near to."""
+    """Refuse borders without a viewpoint near by."""
     needed_m = 2 * distances.radius_m
     return [
         _refuse(distances, border, RefusalReason.NO_WAY)
@@ -218,8 +218,8 @@ def _refuse_cut_off(distances: DistanceField, borders: Sequence[Border]) -> list
 def merge_by_place(frontiers: list[Frontier]) -> list[Frontier]:
     """Return frontiers whose poses are farther from each other than a look is.
 
-    The pose with most to see stands for all that are near to it: the gain, which is the same
-    unknown, is counted once, and the borders become one.
+    The pose with the largest gain represents all poses near it: their gain, which is the same
+    unknown, counts once, and their borders become one.
     """
     waiting = sorted(frontiers, key=lambda frontier: -frontier.gain_m2)
     places = np.array([[frontier.pose.x, frontier.pose.y] for frontier in waiting]).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Which frontier first: much to see soon, without having to come back for the rest."""
+"""Rank frontiers: large gain soon, without having to come back for the rest."""
 
 import math
 from collections.abc import Sequence
@@ -14,13 +14,13 @@ from mapspeak.spatial.paths.lattice import moves_within
 from mapspeak.spatial.paths.wavefront import Seeds, spread
 
 N_WEIGHED = 9
-"""The round is reckoned through so many frontiers, the most promising ones; others come after."""
+"""Number of most promising frontiers in the computed round; others come after."""
 DETOUR_WORTH_M2 = 0.5
 """A metre that has to be driven later, to come back, is worth this much new floor now."""
 STOP_M = 0.5
-"""What a stop costs beside the way to it."""
+"""Cost of a stop in addition to the way to it."""
 MOST_CELLS = 4_000_000
-"""So many cells are held in memory for waves that spread together."""
+"""Limit of cells in memory for waves that spread together."""
 
 
 def gain_rate(gain_m2: float, distance_m: float) -> float:
@@ -31,16 +31,16 @@ def gain_rate(gain_m2: float, distance_m: float) -> float:
 def rank(
     distances: DistanceField, frontiers: Sequence[Frontier], known_ways: WaysBetween | None = None
 ) -> tuple[list[Frontier], WaysBetween]:
-    """Return frontiers in the order in which to think of them, each with its merits.
+    """Return frontiers in order of preference, each with its merits.
 
-    Gain per metre of way is what shows most of a building soon. It leaves corners behind, though,
-    so the metres by which the round through all frontiers grows are set against the gain.
+    Gain per metre of way shows most of a building soon, but leaves corners behind. So the growth of
+    the round through all frontiers, in metres, is subtracted from the gain.
 
     Args:
-        known_ways: Between frontiers of the same map; used if they are those that matter.
+        known_ways: Between frontiers of the same map; used if they cover those compared.
 
     Returns:
-        The frontiers, and the ways between those that were weighed.
+        The frontiers, and the ways between those compared.
     """
     by_rate = sorted(frontiers, key=lambda each: -gain_rate(each.gain_m2, each.distance_m))
     weighed, others = by_rate[:N_WEIGHED], by_rate[N_WEIGHED:]
@@ -59,7 +59,7 @@ def rank(
 
 
 def _with_merits(ranked: Sequence[Frontier]) -> list[Frontier]:
-    """Return frontiers in their order, each with what sets it apart."""
+    """Return frontiers in their order, each with its merits."""
     if len(ranked) == 1:
         return [replace(ranked[0], merits=(FrontierMerit.ONLY,))]
     rates = [gain_rate(frontier.gain_m2, frontier.distance_m) for frontier in ranked]
@@ -82,7 +82,7 @@ def _with_merits(ranked: Sequence[Frontier]) -> list[Frontier]:
 def _find_ways(
     distances: DistanceField, frontiers: list[Frontier], known: WaysBetween | None
 ) -> WaysBetween:
-    """Return the ways between frontiers in their order, out of known ones where these have all."""
+    """Return the ways between frontiers in their order, from known ones if these have all."""
     stops = tuple(each.pose.point for each in frontiers)
     if known is not None and set(stops) <= set(known.stops):
         picked = [known.stops.index(stop) for stop in stops]
@@ -93,7 +93,7 @@ def _find_ways(
 
 
 def _detours_m(frontiers: list[Frontier], ways: WaysBetween) -> list[float]:
-    """Return how much longer than the shortest round the one is that begins with each."""
+    """Return for each frontier how much longer the round that begins there is than the shortest."""
     if len(frontiers) < 2:
         return [0.0] * len(frontiers)
     from_robot_m = np.array([each.distance_m for each in frontiers])
@@ -105,13 +105,13 @@ def _detours_m(frontiers: list[Frontier], ways: WaysBetween) -> list[float]:
 def find_ways_between(distances: DistanceField, stops: list[Point]) -> FloatArray:
     """Return the lengths of ways between reachable places, shape (n, n), in metres.
 
-    They are estimates: the floor is looked at in cells so coarse that walls, which keep the robot's
-    radius on both sides, just do not vanish.
+    They are estimates, on the coarsest cells at which walls, widened by the robot's radius on both
+    sides, do not vanish.
     """
     grid = distances.grid
     factor = max(int(distances.radius_m / math.sqrt(2) / grid.resolution_m), 1)
     rows, cols = grid.cells_at(np.array([[stop.x, stop.y] for stop in stops]))
-    # By way of the robot's own place there is a way between any two of them: none is longer.
+    # The way through the robot's own position joins any two of them, so no way is longer.
     from_robot_m = distances.distances_at(rows, cols)
     reach = math.ceil(float(from_robot_m.max()) / grid.resolution_m) + 1
     window = grid.window(rows, cols, margin=reach)
@@ -130,8 +130,8 @@ def find_ways_between(distances: DistanceField, stops: list[Point]) -> FloatArra
 def _spread_together(distances: Mask, starts: IntArray, goals: IntArray) -> FloatArray:
     """Return the ways in cells from each start to all goals, shape (starts, goals).
 
-    Each wave has a copy of the floor of its own, one above the other, as it is the number of steps
-    that takes the time.
+    Each wave spreads on its own copy of the floor; the copies are stacked, as the number of steps
+    determines the time.
     """
     n_copies = len(starts)
     moves = np.tile(moves_within(distances), (n_copies, 1))

@@ -1,9 +1,8 @@
-"""From where the robot can look beyond a border, and what may come into view there.
+"""Viewpoints to look beyond a border, and the gain that may come into view there.
 
-Walls end the rays of a look, and the unknown wears them out: something hides what lies behind it in
-the unknown as it does on known floor. So a ray lasts there as far as rays last on this map: it is
-met by a wall once per so many metres, by chance, and what it may show is weighed by how likely it
-gets there.
+Walls end rays, and the unknown attenuates them: obstacles hide what lies behind them there as on
+known floor. So a ray hits a wall in the unknown at random, once per mean ray length of this map,
+and what it may show is weighted by the probability that the ray gets there.
 """
 
 import itertools
@@ -22,30 +21,30 @@ from mapspeak.spatial.paths.lattice import Clearance, clearance_m
 from mapspeak.spatial.visibility import cast_rays
 
 TARGET_EVERY_M = 1.0
-"""Of a longer border, several places are looked at."""
+"""Longer borders have several targets, this far apart."""
 MOST_TARGETS = 6
 REACH_M = 0.5
-"""A border further than this from where the robot can stand cannot be looked over from there."""
+"""A robot farther than this from a border cannot look over it."""
 COMFORT_M = 0.1
-"""How much more than its radius the robot should have around it where it is sent to look.
+"""Clearance beyond its radius that the robot should have at a viewpoint.
 
-A navigator plans on its own map with its own rounding and padding; what is just wide enough here
-it refuses. Two cells of a usual map make up for both.
+A navigator plans on its own map with its own rounding and padding, and refuses places that are
+just wide enough here. Two cells of a usual map make up for both.
 """
 _TARGET_ANGLES_RAD = np.linspace(0.0, math.tau, 32, endpoint=False)
 AT_ONCE = 256
 """Places whose rays are held in memory together."""
 
 SIGHT_M = 8.0
-"""How far a look goes at most; rooms end what a LiDAR could see beyond."""
+"""Range limit of a look; rooms limit what a LiDAR could see beyond."""
 STEP_M = 0.15
-"""Rays are looked at so often; walls are thicker, as nothing is seen through small holes."""
+"""Sampling distance along rays; walls are thicker, as small holes in them are closed."""
 WALL_HOLE_M = 0.3
 """Beams far apart leave holes in walls; through one this wide nothing can be seen."""
 N_RAYS = 72
 _ANGLES_RAD = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
 LEAST_LEANING_RATIO = 0.02
-"""Unknown that leans less than this to one side lies all around."""
+"""Unknown with a weaker mean direction than this lies all around."""
 
 Depths = NDArray[np.uint8]
 
@@ -55,8 +54,8 @@ class FrontierViewpoint:
     """A place to look beyond a border from.
 
     Attributes:
-        cell: One that the robot can reach.
-        target: The border's cell that it was chosen for.
+        cell: A cell that the robot can reach.
+        target: The cell of the border that it was chosen for.
     """
 
     cell: Cell
@@ -66,10 +65,10 @@ class FrontierViewpoint:
 def find_viewpoints(
     distances: DistanceField, borders: Sequence[Border]
 ) -> list[list[FrontierViewpoint]]:
-    """Find for each border places to look beyond it from, all along it; none where none is near.
+    """Find viewpoints all along each border; none if no place near by suits.
 
-    A place is in sight of the border. It has room for the robot and some more where there is such
-    a place in reach, else it is the one with most room; of equals it is the nearest one.
+    A viewpoint is in sight of the border. It has clearance to spare if there is such a place in
+    reach, else it is the one with most clearance; of equals it is the nearest one.
     """
     if not borders:
         return []
@@ -93,7 +92,7 @@ def find_viewpoints(
 
 
 def _choose_targets(distances: DistanceField, border: Border) -> tuple[IntArray, IntArray]:
-    """Pick cells of a border, where the robot can go right to it if there is such a piece."""
+    """Pick cells of a border, if possible where the robot can go right up to it."""
     near = np.flatnonzero(distances.reachable[border.rows, border.cols])
     every_m = TARGET_EVERY_M if near.size else REACH_M
     rows, cols = (border.rows[near], border.cols[near]) if near.size else (border.rows, border.cols)
@@ -140,7 +139,7 @@ def _find_cells_off(distances: DistanceField, rows: IntArray, cols: IntArray) ->
     is_passed[:, :, 0] = True
     is_seen = np.logical_and.accumulate(is_passed, axis=2)
     room_m = np.minimum(clearances_m, distances.radius_m + COMFORT_M)
-    # A step further away must be worth more room than the distance's whole weight.
+    # A step further away must gain more room than the whole weight of the distance.
     worth = np.where(is_seen & is_reachable, room_m - steps * 1e-6, -np.inf)
     flat = worth.reshape(rows.size, -1)
     best = flat.argmax(axis=1)
@@ -178,7 +177,7 @@ class Views:
     openness_m: float
 
     def areas_m2(self, openness_m: float) -> FloatArray:
-        """Return what may come into view along each ray, where rays last so far on average."""
+        """Return what may come into view along each ray, given the mean length of rays."""
         passed_m = np.arange(self.steps_m.size + 1) * self.stride_m
         lasting = np.exp(-passed_m / openness_m).astype(np.float32)
         lasting[0] = 0.0
@@ -190,7 +189,7 @@ class Views:
         return areas_m2
 
     def find_gains(self) -> list[ExpectedGain]:
-        """Find the gain that is to be expected at each place."""
+        """Find the expected gain at each place."""
         areas_m2 = self.areas_m2(self.openness_m)
         totals_m2 = areas_m2.sum(axis=1)
         along_x, along_y = areas_m2 @ np.cos(_ANGLES_RAD), areas_m2 @ np.sin(_ANGLES_RAD)
@@ -204,7 +203,7 @@ class Views:
 
 
 def find_views(grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Cell]) -> Views:
-    """Find what there is to see from the centre of each of some cells inside the array.
+    """Find what is visible from the centre of each of some cells inside the array.
 
     Outside the array everything is unknown.
 
@@ -239,7 +238,7 @@ def rows_and_cols(cells: Sequence[Cell]) -> tuple[IntArray, IntArray]:
 def _look(
     grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Cell], steps: FloatArray
 ) -> tuple[Mask, Mask]:
-    """Return where rays are over the unknown, and where no wall hides them; by place, ray, step."""
+    """Return where rays are over the unknown, and not hidden by a wall; by place, ray, step."""
     rows, cols = rows_and_cols(places)
     middles = np.stack([rows, cols], axis=1) + 0.5
     rays = cast_rays(grid.cells.shape, middles, angles_rad=_ANGLES_RAD, steps=steps)
@@ -253,12 +252,12 @@ def _look(
 def remaining_ratio(grid: OccupancyGrid, frontier: Frontier) -> float:
     """Return the share of a frontier's gain that its pose still promises.
 
-    A robot under way to a frontier can turn to the next one when this falls: it has seen from afar
-    what it was sent to see. The map may have grown and moved its origin since.
+    A robot under way to a frontier can turn to the next one when this falls: it has already seen
+    from afar what it was sent to see. The map may have grown and moved its origin since.
     """
     place = grid.cell_at(frontier.pose.point)
     reach = math.ceil((SIGHT_M + WALL_HOLE_M) / grid.resolution_m)
-    # The map around it, which may lie anywhere, with unknown outside the array.
+    # The map around it, wherever it is, with unknown outside the array.
     cells = np.full((2 * reach + 1, 2 * reach + 1), UNKNOWN, dtype=np.int8)
     rows, cols = grid.window(place.row, place.col, margin=reach)
     top, left = place.row - reach, place.col - reach

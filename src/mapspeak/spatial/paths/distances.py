@@ -22,15 +22,15 @@ from mapspeak.spatial.paths.wavefront import Costs, descend, spread
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DistanceField:
-    """How far a robot has to drive from one place to every other; compared by identity.
+    """Driving distances from one place to every other; compared by identity.
 
-    Distances are the lengths of shortest ways over eight-connected cells, so up to 8 % more than
-    around the same corners as the crow flies.
+    Distances are the lengths of shortest paths over eight-connected cells, so up to 8 % longer than
+    straight lines around the same corners.
 
     Attributes:
         lattice: The cells that the distances belong to.
         costs: The distances in lattice cells, flat; infinite where the robot cannot go.
-        closed_lattice: The map's, without a gap that was opened for this start.
+        closed_lattice: The map's lattice, without a gap that was opened for this start.
     """
 
     start: Point
@@ -47,11 +47,11 @@ class DistanceField:
 
     @property
     def clearances_m(self) -> Clearance:
-        """From every cell of the map to the nearest obstacle."""
+        """Distance from every cell of the map to the nearest obstacle."""
         return self.lattice.fine_clearance_m
 
     def distance_to(self, point: Point) -> float | None:
-        """Return the metres to a point by path; None where the robot cannot get to."""
+        """Return the metres to a point by path; None if the robot cannot get there."""
         index = self._find_reached(point)
         if index is None:
             return None
@@ -59,7 +59,7 @@ class DistanceField:
         return max(by_cells, self.start.distance_to(point))
 
     def _find_reached(self, point: Point) -> int | None:
-        """Find the lattice cell at a point; None where the robot cannot get to."""
+        """Find the lattice cell at a point; None if the robot cannot get there."""
         index = self.lattice.index_at(point)
         return index if index is not None and math.isfinite(self.costs[index]) else None
 
@@ -68,7 +68,7 @@ class DistanceField:
         return None if goal is None else descend(self.lattice.moves, None, self.costs, goal)
 
     def is_reachable(self, point: Point) -> bool:
-        """Return True where the robot can drive to from the start."""
+        """Return True if the robot can drive there from the start."""
         return self.distance_to(point) is not None
 
     def path_to(self, point: Point) -> Path | None:
@@ -82,7 +82,7 @@ class DistanceField:
         """Find a way near the cheapest one where some floor costs more.
 
         Args:
-            weights: What a metre costs in each cell of the map, 1 or more.
+            weights: Cost of a metre in each cell of the map, 1 or more.
         """
         coarse = self.lattice.coarsened(weights)
         ends = (self.start, point)
@@ -109,12 +109,12 @@ class DistanceField:
 
     @cached_property
     def reachable(self) -> Mask:
-        """True where on the map the robot can drive to."""
+        """True at the cells of the map that the robot can reach."""
         is_reached = np.isfinite(self.costs).reshape(self.lattice.moves.shape)
         return self.lattice.passable & self.lattice.refined(is_reached)
 
     def distances_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
-        """Return the metres by path to cells of the map; infinite where the robot cannot get to."""
+        """Return the metres by path to cells of the map; infinite where the robot cannot go."""
         costs = self.costs[self.lattice.indices(rows, cols)]
         metres = costs.astype(np.float64) * self.lattice.cell_size_m
         return np.where(self.lattice.passable[rows, cols], metres, np.inf)
@@ -162,9 +162,9 @@ def _spread_from(lattice: Lattice, start: Point, radius_m: float) -> Costs:
 
 
 POCKET_M2 = 5.0
-"""A robot that can go nowhere but on so little floor may be in a pocket."""
+"""A robot confined to less floor than this may be in a pocket."""
 FINE_RATIO = 0.2
-"""Of the radius: on a map of larger cells one of them is no mere doubt about a gap."""
+"""Share of the radius; on larger cells, a gap that lacks one cell is surely too narrow."""
 
 
 def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float) -> Lattice:
@@ -172,11 +172,11 @@ def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float
 
     Args:
         lattice: The map's, for the robot's radius.
-        costs: What can be reached on it, from the start.
+        costs: On that lattice, from the start.
 
     Returns:
-        The same lattice where no gap that lacks less than one cell on each side leads out, and on
-        a coarse map.
+        The same lattice on a coarse map, or if no gap that lacks less than one cell on each side
+        leads out.
     """
     cell_m = lattice.grid.resolution_m
     if cell_m > FINE_RATIO * radius_m:

@@ -23,9 +23,9 @@ Clearance = NDArray[np.float32]
 
 
 def clearance_m(grid: OccupancyGrid) -> Clearance:
-    """Return for every cell the metres to the nearest occupied cell; infinite where there is none.
+    """Return for every cell the metres to the nearest occupied cell; infinite if there is none.
 
-    Unknown cells are no obstacle here: a robot that looks into the unknown stands beside it.
+    Unknown cells are not obstacles here: a robot that looks into the unknown stands beside it.
     """
     return measure_away(grid.occupied) * np.float32(grid.resolution_m)
 
@@ -64,11 +64,11 @@ _EAST, _NORTH, _WEST, _SOUTH, _NORTH_EAST, _NORTH_WEST, _SOUTH_WEST, _SOUTH_EAST
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lattice:
-    """A grid's passable cells, perhaps two by two, and where one can go from each.
+    """A grid's passable cells, perhaps two by two, and the moves from each.
 
     Attributes:
         passable: True where the robot's centre may be; the shape of the map.
-        factor: How many of the map's cells make the side of one of the lattice.
+        factor: Number of the map's cells along the side of a lattice cell.
         moves: The directions in which each lattice cell may be left, as bits.
         is_open: True where a lattice cell can be entered.
         clearance_m: The largest within each lattice cell.
@@ -93,7 +93,7 @@ class Lattice:
         return int(self.moves.shape[1])
 
     def index_at(self, point: Point) -> int | None:
-        """Return the flat index of the cell at a point; None where the robot cannot be."""
+        """Return the flat index of the cell at a point; None if the robot cannot be there."""
         cell = self.grid.cell_at(point)
         if not (self.grid.contains(cell) and self.passable[cell.row, cell.col]):
             return None

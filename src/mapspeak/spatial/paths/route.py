@@ -26,20 +26,20 @@ COMFORT_M = 0.4
 WALL_WEIGHT = 2.0
 """A metre of way that grazes a wall counts as this many metres more."""
 CORRIDOR_M = 0.5
-"""How far to both sides of a rough way the fine one is looked for."""
+"""The fine path is searched this far to both sides of the rough one."""
 HOP_MARGIN_M = 0.5
-"""How much further than its own radius a robot may hop."""
+"""Reach of a hop beyond the robot's radius."""
 HOP_CHOICE_M = 0.3
-"""How much further than the nearest cell the hop may go, where the way is shorter from there."""
+"""Reach of a hop beyond the nearest cell, if the way is shorter from there."""
 HOP_COST = 3.0
 """A metre of hop is worth this much of a way: enough to get into passable cells soon."""
 N_MORE_PULLS = 2
-"""How often a straightened path is pulled again; more no longer shortens it."""
+"""Number of further passes over a straightened path; more no longer shorten it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """A way from the first point to the last one, straight in between.
+    """A polyline from the first point to the last.
 
     Attributes:
         points: At least two places, in the order they are passed.
@@ -67,7 +67,7 @@ class Path:
 
 
 def find_path(grid: OccupancyGrid, start: Point, goal: Point, *, radius_m: float) -> Path | None:
-    """Find a way that keeps the robot off walls where that costs little; None where there is none.
+    """Find a path that keeps off walls where that costs little; None if there is none.
 
     It never leads through unknown cells or nearer to an obstacle than the radius. Only the start
     may be in such a place: the first leg then hops to a cell near by where the robot may be.
@@ -111,7 +111,7 @@ def find_path_near(
 def find_way(
     lattice: Lattice, weights: Costs, ends: tuple[Point, Point], *, radius_m: float
 ) -> IntArray | None:
-    """Find the cheapest way over the cells of a lattice; None where there is none."""
+    """Find the cheapest path over the cells of a lattice; None if there is none."""
     goal = lattice.index_at(ends[1])
     seeds = find_seeds(lattice, ends[0], radius_m=radius_m)
     if goal is None or seeds is None:
@@ -121,7 +121,7 @@ def find_way(
 
 
 def _wall_weights(lattice: Lattice, radius_m: float) -> Costs:
-    """Return what a metre costs in each cell: 1 in the open, more towards walls."""
+    """Return the cost of a metre in each cell: 1 in the open, more towards walls."""
     lacking = (radius_m + COMFORT_M - lattice.clearance_m) / COMFORT_M
     np.clip(lacking, 0.0, 1.0, out=lacking)
     return np.asarray(1 + WALL_WEIGHT * lacking**2, dtype=np.float32)
@@ -149,13 +149,13 @@ def _build_corridor(
     crop = lattice.grid.crop(*window)
     n_rows, n_cols = crop.cells.shape
     fine = build_fine_lattice(crop, radius_m)
-    # What was opened on the whole map, for a robot in a pocket, stays open on this part.
+    # A gap opened on the whole map, for a robot in a pocket, stays open on this part.
     opened = with_passable(fine, fine.passable | lattice.passable[window])
     return restrict(opened, near[:n_rows, :n_cols]), window
 
 
 def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | None:
-    """Return the lattice cells where a way from the start begins; None where there are none."""
+    """Return the lattice cells where a path from the start begins; None if there are none."""
     index = lattice.index_at(start)
     if index is not None:
         return Seeds(np.array([index]), np.zeros(1, dtype=np.float32))
@@ -174,11 +174,10 @@ def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | No
 
 
 def _hops(lattice: Lattice, start: Point, *, reach_m: float) -> tuple[IntArray, IntArray, Costs]:
-    """Return passable cells in reach of a hop, and what it costs more than that to the nearest.
+    """Return passable cells in reach of a hop, and the extra cost over the nearest.
 
     One cell of wall costs more than any hop around it: a robot that seems to stand in a wall
-    leaves it on the near side, and no other hop goes through a wall. None at all goes over what
-    is barred.
+    leaves it on the near side, and no other hop goes through a wall. No hop crosses barred cells.
     """
     here, window = lattice.grid.cell_at(start), lattice.grid.window_around(start, reach_m)
     top, left = window[0].start, window[1].start
@@ -188,7 +187,7 @@ def _hops(lattice: Lattice, start: Point, *, reach_m: float) -> tuple[IntArray, 
     seed = Seeds(np.array([at]), np.zeros(1, dtype=np.float32))
     barred = lattice.grid.find_barred(start)
     may_pass = np.ones_like(occupied) if barred is None else ~barred[window]
-    # A cell that an area only touches may be the robot's own.
+    # A cell that an area merely touches may be the robot's own.
     may_pass.flat[at] = True
     spent = spread(moves_within(may_pass), weights, seed).reshape(occupied.shape)
     is_reached = passable & np.isfinite(spent)
@@ -224,7 +223,7 @@ def pull_straight(mask: Mask, weights: Costs, places: FloatArray) -> FloatArray:
 
     Args:
         mask: Where legs may lead.
-        weights: What a cell's side of way costs in each cell.
+        weights: Cost of moving by a cell's side in each cell.
         places: The way, in fractional cells.
     """
     walled = np.where(mask, weights, np.float32(np.inf))
@@ -240,7 +239,7 @@ def _corner_indices(walled: Costs, weights: Costs, places: FloatArray) -> list[i
     cells = np.floor(places).astype(np.intp)
     on_way = weights[cells[:, 0], cells[:, 1]].astype(np.float64)
     lengths = np.hypot(*np.diff(places, axis=0).T)
-    # What the way has cost up to each place.
+    # The cost of the way up to each place.
     spent = np.concatenate([[0.0], np.cumsum(lengths * (on_way[:-1] + on_way[1:]) / 2)])
 
     def is_leg(first: int, last: int) -> bool:

@@ -23,18 +23,18 @@ north-east, north-west, south-west, south-east. North is the next row."""
 STEPS = np.array([1.0] * 4 + [math.sqrt(2.0)] * 4, dtype=np.float32)
 """The length of a move in each direction, in cells."""
 ROUNDING = 1e-3
-"""How much two costs of the same way may differ, in cells and as a share."""
+"""Tolerance between two costs of the same way, in cells and as a share."""
 FEW_BUCKETS = 8
-"""So many are looked through one by one."""
+"""Up to this many buckets are searched one by one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seeds:
-    """Where a wavefront starts.
+    """Start cells of a wavefront.
 
     Attributes:
         cells: Flat indices, each once.
-        costs: What has been spent to be there.
+        costs: Cost already spent at each.
     """
 
     cells: IntArray
@@ -52,13 +52,13 @@ def offsets(n_cols: int) -> IntArray:
 def spread(
     moves: Moves, weights: Costs | None, seeds: Seeds, *, goals: IntArray | None = None
 ) -> Costs:
-    """Return the least cost to every cell, flat; infinite where the wave does not come.
+    """Return the least cost to every cell, flat; infinite where the wave does not arrive.
 
     Args:
         moves: Shape (rows, cols); the directions in which each cell may be left. No move may leave
             the array, so the outermost cells have none outwards.
-        weights: What a unit of way costs in each cell, at least 1; a move costs its length times
-            the mean of both ends. None where all cells cost 1.
+        weights: Cost of a unit of way in each cell, at least 1; a move costs its length times the
+            mean of both ends. None if all cells cost 1.
         goals: Stop once all these cells are settled.
     """
     front = _Front(moves, None if weights is None else weights.ravel(), seeds)
@@ -96,7 +96,7 @@ def descend(moves: Moves, weights: Costs | None, costs: Costs, goal: int) -> Int
 
 
 class _Front:
-    """The wave under way: costs so far, and the cells waiting in their buckets."""
+    """State of the wave: costs so far, and the cells waiting in their buckets."""
 
     def __init__(self, moves: Moves, weights: Costs | None, seeds: Seeds) -> None:
         n_cells = moves.size
@@ -116,7 +116,7 @@ class _Front:
             cells = np.concatenate(self._waiting.pop(min(self._waiting)))
             cells = cells[~self.is_settled[cells]]
             order = np.arange(cells.size, dtype=np.int32)
-            # Each once: that which wrote last.
+            # Each once: the last writer wins.
             self._last_writer[cells] = order
             cells = np.asarray(cells[self._last_writer[cells] == order])
             if cells.size:

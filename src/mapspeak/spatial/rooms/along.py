@@ -1,4 +1,4 @@
-"""A corridor as somebody walks it: which doors come, in which order, on which side."""
+"""Walk along a corridor: its doors in order, and the side of each."""
 
 import math
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ AHEAD_RAD = math.radians(50)
 CELL_M = 0.25
 """Fine enough to walk by: a person's corridor is several such cells wide."""
 END_RATIO = 0.42
-"""An end of the walk keeps so much of the corridor's width from walls: half would be its middle."""
+"""Ends keep this share of the corridor's width from walls; half would be the middle."""
 STEP_M = 0.05
 SLICE_M = 0.6
-"""The middle of so much of a corridor is one point of the walk."""
+"""Length of the slices of a corridor; the middle of each is a point of the walk."""
 TANGENT_M = 3.0
-"""The walking direction is that over so much of the walk."""
+"""Length of walk over which the walking direction is taken."""
 WALL_M = 0.5
-"""A door that a walk leads past is behind no thicker a wall."""
+"""Thickest wall between a walk and a door beside it."""
 
 
 class DoorSide(StrEnum):
-    """Where a door is as somebody walks past it."""
+    """Position of a door relative to the walk."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -43,8 +43,8 @@ class PassedDoor:
 
     Attributes:
         along_m: From the start of the walk, along it, to the point nearest to the door.
-        side: On which side it is; elsewhere where the walk does not lead past it, because the
-            corridor branches or leads all around.
+        side: Its side; elsewhere if the walk does not pass it, because the corridor branches or
+            leads all around.
     """
 
     door_id: str
@@ -75,8 +75,8 @@ def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
     """Walk a region from end to end, past all its doors; None where it has no length.
 
     The ends are the two places farthest from each other by path, and the walk leads through the
-    middles of what is equally far from its start, near the shortest way to its end: so it keeps
-    to the floor of a corridor that branches, or leads all around.
+    middles of cells equally far from its start, near the shortest way to its end. So it stays on
+    the floor of a corridor that branches, or leads all around.
     """
     floor = _floor_of(rooms, region)
     reached = _distances_from_end(floor, region)
@@ -173,7 +173,7 @@ def _farthest(distances: DistanceField, candidates: FloatArray) -> Point | None:
 
 
 def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
-    """Return the middles of what is equally far, a point for each slice."""
+    """Return the middle of each slice of equally far points."""
     n = max(round(float(away_m.max()) / SLICE_M), 2)
     number = np.minimum((away_m / away_m.max() * n).astype(np.intp), n - 1)
     sizes = np.bincount(number, minlength=n)

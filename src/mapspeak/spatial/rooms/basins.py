@@ -20,9 +20,9 @@ Heights = NDArray[np.float32]
 BasinLabels = NDArray[np.int32]
 
 RISES_M = (0.3, 0.6, 1.0, 1.5)
-"""So far up from a pass, on both sides, clearance is looked at again."""
+"""Distances from a pass, on both sides, at which clearance is sampled."""
 HALF_WIDTH, CONTACT, WALL, GAP, FIRST, RISE = range(6)
-"""Columns of what is known of a pass; from RISE on the clearances on the way up, FIRST's first."""
+"""Columns of `Passes.values`; from RISE on the sampled clearances, FIRST's side first."""
 _REACH_M = 1.5
 _SLACK_RATIO = 1.3
 _SLACK_M = 0.3

@@ -1,7 +1,7 @@
-"""The places that a floor falls into, and what is measured of the borders between them.
+"""The places of a floor, and measures of the borders between them.
 
-A place begins as one basin of clearance, and places are joined. All that describes a place is a
-sum or a maximum over its basins, so that a join costs no look at the floor.
+A place begins as one basin of clearance, and places are joined. A place is described by sums and
+maxima over its basins, so that a join needs no access to the floor.
 """
 
 import numpy as np
@@ -54,7 +54,7 @@ MEASURES = (
         for number, _ in enumerate(RISES_M)
     ),
 )
-"""What is measured of a border; its narrower side is that with the smaller clearance.
+"""Measures of a border; its narrower side is the one with the smaller clearance.
 
 Widths are halved, as clearances are. A walk is the length of a place, along its bends, over its
 width. Fill is the area of a place over that of the rectangle with the same second moments.
@@ -90,7 +90,7 @@ class PlaceGraph:
         )
 
     def _add_border(self, one: int, other: int, number: int) -> None:
-        """Add a border, or make it one with that which is there: the wider pass of both."""
+        """Add a border, or merge it into the existing one, with the wider pass of both."""
         kept = self.neighbours[one].get(other)
         if kept is None:
             self.neighbours[one][other] = self.neighbours[other][one] = number
@@ -115,7 +115,7 @@ class PlaceGraph:
         return float(self._peak_m[place])
 
     def unseen_share(self, place: int) -> float:
-        """Return how much of the outline of a place borders on what has not been seen."""
+        """Return how much of the outline of a place borders on unseen cells."""
         edge = self._sums[_EDGE, place]
         return float(self._sums[_UNSEEN, place] / edge) if edge else 0.0
 
@@ -133,7 +133,7 @@ class PlaceGraph:
             self._add_border(place, other, number)
 
     def measure(self, pairs: IntArray) -> FloatArray:
-        """Return what is measured of the borders between two places each.
+        """Return the measures of the borders between pairs of places.
 
         Args:
             pairs: Shape (n, 2).
@@ -242,7 +242,7 @@ def _fill(sums: FloatArray) -> FloatArray:
     """Return area over that of the rectangle with the same second moments: 1 for a rectangle."""
     n = sums[_CELLS]
     row, col = sums[_ROW] / n, sums[_COL] / n
-    # A cell is a square with a spread of its own.
+    # Each cell is a square with its own spread.
     high = sums[_ROW_ROW] / n - row**2 + 1 / 12
     wide = sums[_COL_COL] / n - col**2 + 1 / 12
     cross = sums[_ROW_COL] / n - row * col

@@ -18,17 +18,17 @@ from mapspeak.spatial.rooms.room_map import LETTER, Door, Region, RoomClass, Roo
 from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
 STRIP = 3.0
-"""So many squares in a row are a strip: something to walk along, not a room."""
+"""Elongation from which a region is a strip: something to walk along, not a room."""
 CORRIDOR_LADDER = ((2 * STRIP, 0), (2.5, 3), (2.0, 4), (1.5, 5), (1.0, 6))
 """Elongation above which a region is a corridor, by the least number of its neighbours.
 
-An L-shaped room is as elongated as a strip, and leads to one or two others. What leads to no more
-is a corridor only if it is a strip, straight (`Shape.is_strip`) or on both sides of a bend.
+An L-shaped room is as elongated as a strip, and leads to one or two others. A region with no more
+exits is a corridor only if it is a strip, straight (`Shape.is_strip`) or on both sides of a bend.
 """
 ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""
 HALL_WIDTH_M = 10.0
-"""What is as wide as this all along is a hall, wherever it leads."""
+"""A region at least this wide all along is a hall, wherever it leads."""
 RUN_ON_RATIO = 0.7
 """A way between two corridors that is as wide as this, beside the wider one, is a bend."""
 OPEN_SPACE_WIDTH_M = 8.0
@@ -42,7 +42,7 @@ class RegionShape:
     Attributes:
         open_clearance_m: The largest clearance if what stands free in the region were gone.
         mean_clearance_m: The mean distance of its floor from the nearest wall.
-        is_half_seen: Some of its outline borders on what has not been seen.
+        is_half_seen: Part of its outline borders on unseen cells.
     """
 
     region: Region
@@ -112,7 +112,7 @@ def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionSh
 
 
 def _unseen_share(raster: Raster, inside: Mask, window: Window) -> float:
-    """Return how much of the outline of a region borders on what has not been seen."""
+    """Return how much of the outline of a region borders on unseen cells."""
     region = np.pad(inside.astype(np.uint8), 1)
     outline = (cv2.dilate(region, np.ones((3, 3), np.uint8)) > 0) & (region == 0)
     rows, cols = (slice(max(part.start - 1, 0), part.stop + 1) for part in window)
@@ -151,7 +151,7 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
 
 
 def classify(shape: RegionShape, *, n_neighbours: int, exits_m: Sequence[float]) -> RoomClass:
-    """Return what a person would call a region.
+    """Return the class of a region.
 
     Args:
         exits_m: The widths of the ways out of it.
@@ -183,7 +183,7 @@ def walked_size(shape: RegionShape) -> tuple[float, float]:
 _REACH_M = 0.3
 """Border cells nearer than this to each other are one opening."""
 _LEAST_M = 0.4
-"""A narrower gap is a crack in the map of a wall: nobody gets through, and hardly a robot."""
+"""Narrower gaps are cracks in the map of a wall: too narrow for people and most robots."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,7 +233,7 @@ def _split(
     rows: NDArray[np.intp],
     cols: NDArray[np.intp],
 ) -> list[Opening]:
-    """Return the separate openings of a pair of regions: border cells that hang together."""
+    """Return the separate openings of a pair of regions: connected border cells."""
     cell_size_m = segmentation.raster.cell_size_m
     top, left = int(rows.min()), int(cols.min())
     picture = np.zeros((int(rows.max()) - top + 1, int(cols.max()) - left + 1), np.uint8)
@@ -267,7 +267,7 @@ def find_rooms(
 
     Args:
         grid: The map; may be empty, unexplored, furnished, noisy or turned.
-        previous: What was found on an earlier state of this map; its ids are kept.
+        previous: The result for an earlier state of this map; its ids are kept.
 
     Raises:
         MapError: The map has more cells than can be handled.
@@ -288,7 +288,7 @@ def find_rooms(
 def join_corridors(
     segmentation: Segmentation, shapes: list[RegionShape], openings: list[Opening]
 ) -> Segmentation:
-    """Make corridors that run on into one another, round a bend or past pillars, one."""
+    """Merge corridors that continue into one another, round a bend or past pillars."""
     classes = classify_all(shapes, openings)
     number = np.arange(len(shapes) + 1)
     for opening in openings:
@@ -314,7 +314,7 @@ def join_corridors(
 
 
 def classify_all(shapes: list[RegionShape], openings: list[Opening]) -> list[RoomClass]:
-    """Return what a person would call each region."""
+    """Return the class of each region."""
     behind: list[set[int]] = [set() for _ in shapes]
     exits_m: list[list[float]] = [[] for _ in shapes]
     for opening in openings:

@@ -1,6 +1,6 @@
 """The floor that rooms are cut from: what a robot could drive on if the furniture were gone.
 
-Walls are told apart from furniture by what walls do: they run straight, far, and in line.
+Walls differ from furniture in that they run straight, far, and in line.
 """
 
 import math
@@ -31,10 +31,10 @@ class Floor:
     Attributes:
         floor: 1 on floor, furniture and small unseen pockets, else 0.
         wall: 1 on wall, else 0.
-        obstacle: 1 on what stands and cannot be walked around, wall or not, else 0.
+        obstacle: 1 on obstacles that cannot be walked around, wall or not, else 0.
         solid: 1 where nothing is free, furniture left out, else 0.
         directions_deg: The main directions of the walls, from 0 to 90 degrees.
-        clearance_m: How far each floor cell is from what is not floor.
+        clearance_m: Distance of each floor cell from cells that are not floor.
     """
 
     floor: Picture
@@ -55,7 +55,7 @@ def build_floor(raster: Raster) -> Floor:
     occupied = (raster.occupied & (1 - block)) | behind
     floor = free | (occupied & (1 - wall))
     floor |= _find_pockets(floor, wall, SETTINGS.pocket_area_m2 / raster.cell_area_m2)
-    # Parts that nothing joins and that are too small for a room are none.
+    # Drop unconnected parts that are too small for a room.
     floor = drop_specks(floor, SETTINGS.room_area_m2 / raster.cell_area_m2)
     return Floor(
         floor=floor,
@@ -80,7 +80,7 @@ def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
 
 
 def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
-    """Return the way from each cell's centre to the edge of the nearest cell that is no floor."""
+    """Return the distance from each cell's centre to the edge of the nearest cell off the floor."""
     cells = measure_away(np.pad(floor, 1) == 0)
     to_edge = np.maximum(cells[1:-1, 1:-1] - 0.5, 0.0) * cell_size_m
     return np.ascontiguousarray(to_edge, dtype=np.float32)
@@ -118,12 +118,12 @@ SLENDER_RATIO = 0.37
 
 
 def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Picture]:
-    """Return 1 where an obstacle is wall, and 1 where it is no island that furniture could be.
+    """Return 1 where an obstacle is wall, and 1 where it cannot be a free-standing island.
 
     Wall is a long run in a main direction, or in line with one.
 
-    A run of twice that length is wall in any direction, and so are long curved walls. What is
-    thicker than a wall, such as a cupboard, is no piece of one that it stands in line with.
+    A run of twice that length is wall in any direction, and so are long curved walls. An
+    obstacle thicker than a wall, such as a cupboard, is not part of a wall that it is in line with.
     """
     size_m = raster.cell_size_m
     occupied = raster.occupied
@@ -151,7 +151,7 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
 def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
     kernel = _line(length, angle_deg)
     core = np.asarray(cv2.erode(picture, kernel), np.uint8)
-    # Most directions fit nowhere.
+    # Most directions match nothing.
     return np.asarray(cv2.dilate(core, kernel), np.uint8) if core.any() else core
 
 

@@ -1,7 +1,7 @@
-"""Furniture told apart from walls by what it is: thicker than they are, and short.
+"""Tell furniture from walls: it is thicker than they are, and short.
 
-A block is what stands free, or with its back to a wall, with floor at its other sides. Where a
-wall runs on in line behind a block, it is wall, and the block ends there.
+A block stands free, or with its back to a wall, with floor at its other sides. If a wall continues
+in line behind a block, that part is wall, and the block ends there.
 """
 
 import cv2
@@ -29,17 +29,17 @@ from mapspeak.spatial.rooms.raster import (
 )
 
 _SPECK_M2 = 0.5
-"""Free places up to this size in or beside a block are none."""
+"""Free specks up to this size in or beside a block do not count as free."""
 _RIM_M = 0.15
-"""Crumbs so near to a block are its own: the rim of a plant, the legs of a chair."""
+"""Crumbs this near to a block belong to it: the rim of a plant, the legs of a chair."""
 _CRUMB_M = 1.0
-"""What is left of an obstacle without its blocks is a crumb if it is smaller across."""
+"""Remains of an obstacle without its blocks are crumbs if smaller across than this."""
 _SEEN_RATIO = 0.5
-"""So much of a block's border to the floor has been seen as an obstacle."""
+"""Least share of a block's border to the floor that was seen as an obstacle."""
 _FILLED_RATIO = 0.7
-"""A block at a wall fills so much of the rectangle around it, square to the walls."""
+"""Least share that a block at a wall fills of its rectangle, square to the walls."""
 _WHOLE_RATIO = 0.85
-"""A block at a wall that is nearly as long as is looked for may go on: it is none."""
+"""Obstacles at a wall longer than this share of the limit may go on: they are not blocks."""
 
 Counts = NDArray[np.intp]
 Numbers = NDArray[np.int32]
@@ -49,7 +49,7 @@ def find_blocks(raster: Raster, wall: Picture) -> tuple[Picture, Picture]:
     """Return 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
-        wall: 1 on what was taken for wall; nothing else runs on behind furniture.
+        wall: 1 on presumed wall; only wall continues behind furniture.
     """
     solid = 1 - drop_specks(raster.free, _SPECK_M2 / raster.cell_area_m2)
     block, behind = _find_blocks(solid, raster.occupied, wall, _Sizes(solid, raster.cell_size_m))
@@ -60,12 +60,12 @@ class _Sizes:
     """Lengths in raster cells.
 
     Attributes:
-        thin: What is thinner is no block, wall behind it included.
-        depth: Nor is what is thinner without that wall.
-        thick: Nor is what is thicker than this both ways.
-        long: How far the floor beside a block may be.
-        tip: A wall has floor so near to its middle.
-        gap: The widest door whose wall runs on in line.
+        thin: Blocks are at least this thick, wall behind them included.
+        depth: Blocks are at least this thick without that wall.
+        thick: Blocks are at most this thick in at least one direction.
+        long: Largest distance to the floor beside a block.
+        tip: Largest distance from the middle of a wall to floor.
+        gap: The widest door whose wall continues in line.
     """
 
     def __init__(self, solid: Picture, cell_size_m: float) -> None:
@@ -92,7 +92,7 @@ def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
         is_fixed = np.ascontiguousarray(fixed.T if axis == 0 else fixed).ravel()[first] > 0
         found.append(length[is_fixed & (length <= most)])
     all_of_them = np.concatenate(found)
-    # So little may be furniture alone, in a room without inner walls.
+    # This little may be all furniture, in a room without inner walls.
     return float(np.median(all_of_them)) if all_of_them.size >= least else 0.0
 
 
@@ -159,8 +159,8 @@ def _find_stubs(
 ) -> Picture:
     """Return pieces of thin wall along an axis.
 
-    What holds nothing that was taken for wall, and runs that way for twice the length, is none:
-    such as the shadow of a chair, or a speck on a wall.
+    A piece must hold presumed wall that runs that way for twice the length, unlike the shadow of a
+    chair, or a speck on a wall.
     """
     across = 1 - axis
     seen = open_box(widen(seen_wall, 1), *line_along(2 * cells.stub, axis).shape)

@@ -15,7 +15,7 @@ New = TypeVar("New", str, int)
 _SAMPLES = 200_000
 _SAME_DOOR_M = 0.6
 _SAME_SIZE_RATIO = 1.5
-"""A region that is back has at most this many times the floor it had, or at least one over that."""
+"""Largest ratio, either way, between the floor of a region that is back and its old floor."""
 _REMAINS_RATIO = 0.25
 """A vanished region became every region that covers at least this share of what is still seen."""
 
@@ -68,7 +68,7 @@ def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
             replace(gone, became=tuple(now.get(name, name) for name in gone.became))
             for gone in vanished
         ),
-        # What regions were called before, by the names they keep and those they have now.
+        # Former names of regions, by their kept and their present names.
         former_ids={old: name for old, name in (earlier | renamed).items() if old != name},
     )
 
@@ -105,9 +105,9 @@ def _match_regions(
 
 
 def _keeps_enough(overlap: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return True where a new region has so much of an old one's floor that it may be that.
+    """Return True where a new region has enough of an old one's floor to be the same.
 
-    What has less is another one, unless no other region has more of it.
+    A region with less is another one, unless no other region has more of that floor.
     """
     shared = overlap.copy()
     shared[:, 0] = 0.0
@@ -189,7 +189,7 @@ def _rename(region: Region, ids: dict[str, str], door_ids: dict[str, str]) -> Re
 
 
 def sort_key(name: str) -> tuple[str, int]:
-    """Return what ids are sorted by: their letter, then their number."""
+    """Return the sort key of an id: its letter, then its number."""
     return name[0], int(name[1:])
 
 
@@ -200,7 +200,7 @@ def _remember(
     ids: dict[str, str],
     door_ids: dict[str, str],
 ) -> tuple[Vanished, ...]:
-    """Return everything that is no longer there, with what became of it by now."""
+    """Return the vanished regions and doors, with the regions that replaced them."""
     kept = set(ids.values()) | set(door_ids.values())
     final = {region.index: ids[region.id] for region in current.regions}
     lost = [
@@ -217,7 +217,7 @@ def _remember(
         for door in previous.doors
     ]
     for gone in previous.vanished:
-        # The region that now covers the place of what vanished earlier.
+        # The region that now covers the place of an earlier vanished one.
         region = None if gone.floor_area_m2 is None else current.find_region_at(gone.place)
         lost.append(replace(gone, became=() if region is None else (ids[region.id],)))
     return tuple(

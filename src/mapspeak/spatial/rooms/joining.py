@@ -1,6 +1,6 @@
-"""Places joined into rooms: the surest join first, each border judged anew as its places grow.
+"""Join places into rooms: the surest join first, each border judged again as its places grow.
 
-How sure a join is comes from a sum of small decision trees over what is measured of the border
+The certainty of a join comes from a sum of small decision trees over the measures of the border
 (Friedman, "Greedy function approximation", 2001), fitted on maps that people divided.
 """
 
@@ -19,7 +19,7 @@ from mapspeak.spatial.rooms.borders import MEASURES, PlaceGraph
 from mapspeak.spatial.rooms.raster import SETTINGS
 
 Judge = Callable[[FloatArray], FloatArray]
-"""From measures, shape (n, len(MEASURES)), to how sure it is that nothing divides, 0 to 1."""
+"""Maps measures, shape (n, len(MEASURES)), to the certainty that nothing divides, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,7 +40,7 @@ class TreeSum:
     depth: int
 
     def __call__(self, measures: FloatArray) -> FloatArray:
-        """Return how sure it is that nothing divides, for each border."""
+        """Return for each border the certainty that nothing divides, 0 to 1."""
         tree = np.arange(len(self.value))
         border = np.arange(len(measures))[:, None]
         node = np.zeros((len(measures), len(tree)), np.intp)
@@ -78,13 +78,13 @@ def read_trees(text: str) -> TreeSum:
 
 
 def join_places(graph: PlaceGraph, judge: Judge) -> None:
-    """Join places until nothing is left that is no room and no border that divides nothing."""
+    """Join places until each is a room and each border divides."""
     join_surest(graph, judge)
     _absorb_small(graph, judge)
 
 
 def join_surest(graph: PlaceGraph, judge: Judge) -> None:
-    """Join places, the surest first, until every border that is left surely divides something."""
+    """Join places, the surest first, until every remaining border surely divides."""
     waiting: list[tuple[float, int, int, int]] = []
     last_judged: dict[tuple[int, int], int] = {}
 
@@ -111,7 +111,7 @@ def join_surest(graph: PlaceGraph, judge: Judge) -> None:
 
 
 def _absorb_small(graph: PlaceGraph, judge: Judge) -> None:
-    """Join what is too small for a room with the neighbour it most surely belongs to."""
+    """Join places too small for a room with the neighbour they most surely belong to."""
     small = [place for place in range(1, len(graph.neighbours)) if _is_small(graph, place)]
     while small:
         place = small.pop()
@@ -125,9 +125,9 @@ def _absorb_small(graph: PlaceGraph, judge: Judge) -> None:
 
 
 def _is_small(graph: PlaceGraph, place: int) -> bool:
-    """Return True for what is no room; of a room that is hardly seen yet, less is enough.
+    """Return True for a place that is not a room; a room hardly seen yet may be smaller.
 
-    A line along which no robot can go is none, however long.
+    A strip too narrow for any robot is not a room, however long.
     """
     if graph.clearance_m(place) < SETTINGS.least_clearance_m:
         return True
@@ -137,7 +137,7 @@ def _is_small(graph: PlaceGraph, place: int) -> bool:
 
 
 def judge_left(graph: PlaceGraph, judge: Judge) -> dict[tuple[int, int], float]:
-    """Return how sure it is that nothing divides two places that were not joined, 0 to 1."""
+    """Return the certainty that nothing divides two places that were not joined, 0 to 1."""
     pairs = [
         (one, other) for one, own in enumerate(graph.neighbours) for other in own if one < other
     ]
@@ -147,7 +147,7 @@ def judge_left(graph: PlaceGraph, judge: Judge) -> dict[tuple[int, int], float]:
 
 
 MAX_ROOMS = int(np.iinfo(np.int16).max)
-"""As many as the labels can tell apart; smaller rooms than these are left out."""
+"""Most rooms that the labels can hold; smaller ones are left out."""
 
 
 def number_by_area(graph: PlaceGraph) -> NDArray[np.int32]:

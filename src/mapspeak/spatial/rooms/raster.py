@@ -28,9 +28,9 @@ class RoomSettings:
         wall_piece_m: The shortest run that can be such a piece.
         wall_thickness_m: Where an obstacle is this thick, it is no such piece.
         island_size_m: An obstacle that can be walked around is wall only if it is larger.
-        block_depth_m: Furniture is at least so deep.
-        block_ratio: And with the wall behind it so many times as thick as the map's walls are.
-        block_thickness_m: One of its sides is at most so long.
+        block_depth_m: Furniture is at least this deep.
+        block_ratio: With the wall behind it, it is this many times as thick as the map's walls.
+        block_thickness_m: One of its sides is at most this long.
         block_length_m: The floor around it is at most this far, along the walls and square to
             them.
         pocket_area_m2: Unseen areas up to this size inside a room count as floor.
@@ -42,8 +42,8 @@ class RoomSettings:
         join_share: Places are joined that nothing divides with at least this certainty.
         room_area_m2: Smaller regions belong to their neighbour.
         part_area_m2: The same for a region that is hardly seen yet.
-        least_clearance_m: Half as wide as a region must be somewhere.
-        half_seen_share: Of such a region at least so much of the outline is not seen.
+        least_clearance_m: Half the width that a region must have somewhere.
+        half_seen_share: Least unseen share of the outline of such a region.
     """
 
     cell_size_m: float = 0.05
@@ -79,9 +79,9 @@ Truths = NDArray[np.bool_]
 Affine = NDArray[np.float64]
 
 UPRIGHT_DEG = 0.6
-"""Walls that near to the rows and columns of the map need no turn."""
+"""Walls this near to the rows and columns of the map need no turn."""
 _LEAST_COVER, _HALF_COVER = 64, 128
-"""Of 255: a turned cell is occupied, or free, where the map's cells cover it so much.
+"""Least cover, of 255, by the map's cells for a turned cell to be occupied, or free.
 
 With more, an oblique wall one cell thick would break.
 """
@@ -97,7 +97,7 @@ class Raster:
 
     Attributes:
         free: 1 where a robot can be, else 0.
-        occupied: 1 where something stands, else 0.
+        occupied: 1 on obstacles, else 0.
         cell_size_m: The side of one raster cell.
         there: From (col, row) of the grid to that of the raster; a cell's centre lies at +0.5.
     """
@@ -115,7 +115,7 @@ class Raster:
 
     @property
     def turn_rad(self) -> float:
-        """How far the raster is turned against the grid."""
+        """Rotation of the raster against the grid."""
         return math.atan2(self.there[1, 0], self.there[0, 0])
 
     def point_at(self, row: float, col: float) -> Point:
@@ -174,7 +174,7 @@ def build_raster(grid: OccupancyGrid) -> Raster:
     there = _shift(cols.start, rows.start)
     off_deg = find_main_direction(_resize(occupied, shrink=shrink, grow=grow, full=False))
     if abs(off_deg) > UPRIGHT_DEG:
-        # Turned as fine as it is, so that walls one cell thick stay whole.
+        # Turned at full resolution, so that walls one cell thick stay whole.
         turn, size = _find_turn(known.shape, off_deg, grow)
         free = _turn(free, turn, size, _HALF_COVER)
         occupied = _turn(occupied, turn, size, _LEAST_COVER)
@@ -194,14 +194,14 @@ def build_raster(grid: OccupancyGrid) -> Raster:
 
 
 def _shift(col: int, row: int) -> Affine:
-    """Return the way to a picture that begins at that column and row."""
+    """Return the transform to a picture that begins at that column and row."""
     return np.array([[1.0, 0.0, -col], [0.0, 1.0, -row], [0.0, 0.0, 1.0]])
 
 
 def _find_turn(
     shape: tuple[int, ...], angle_deg: float, scale: int
 ) -> tuple[Affine, tuple[int, int]]:
-    """Return the way to a picture on which walls of this direction are upright, and its size."""
+    """Return the transform to a picture with walls of this direction upright, and its size."""
     high, wide = shape
     cosine, sine = (scale * part(math.radians(angle_deg)) for part in (math.cos, math.sin))
     turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -212,14 +212,14 @@ def _find_turn(
 
 
 def _turn(part: Picture, turn: Affine, size: tuple[int, int], least: int) -> Picture:
-    """Return a picture turned; a cell is set that is covered so much, of 255."""
+    """Return a picture turned; a cell is set if covered by at least this much, of 255."""
     there = _between_centres(turn)
     cover = cv2.warpAffine(part * np.uint8(255), there, size, flags=cv2.INTER_LINEAR)
     return (np.asarray(cover) >= least).astype(np.uint8)
 
 
 def _between_centres(there: Affine) -> Affine:
-    """Return a way between pictures as OpenCV has it, with (0, 0) in the middle of a cell."""
+    """Return a transform between pictures for OpenCV, with (0, 0) in the middle of a cell."""
     moved = there[:2].copy()
     moved[:, 2] += there[:2, :2] @ (0.5, 0.5) - 0.5
     return moved
@@ -255,7 +255,7 @@ def _resize(picture: Picture, *, shrink: int, grow: int, full: bool) -> Picture:
 
 
 def open_box(picture: Picture, high: int, wide: int) -> Picture:
-    """Return where a box of so many cells fits; what lies outside of the picture is not set."""
+    """Return where a box of this many cells fits; cells outside of the picture are not set."""
     box = np.ones((high, wide), np.uint8)
     return np.asarray(
         cv2.morphologyEx(
@@ -266,18 +266,18 @@ def open_box(picture: Picture, high: int, wide: int) -> Picture:
 
 
 def widen(picture: Picture, cells: int) -> Picture:
-    """Return what is set, and what is so near to it."""
+    """Return the set cells, and those near them."""
     side = 2 * cells + 1
     return np.asarray(cv2.dilate(picture, np.ones((side, side), np.uint8)), np.uint8)
 
 
 def is_near(picture: Picture, cells: int, axis: int) -> Truths:
-    """Return True where something is set at most so many cells away along an axis."""
+    """Return True where a cell within a distance in cells along an axis is set."""
     return np.asarray(cv2.dilate(picture, line_along(2 * cells + 1, axis)) > 0)
 
 
 def is_short(solid: Picture, most: int, axis: int) -> Truths:
-    """Return True in what is solid for at most so many cells along an axis, between floor."""
+    """Return True in solid runs up to a length in cells along an axis, between floor."""
     high, wide = (most, 0) if axis == 0 else (0, most)
     framed = cv2.copyMakeBorder(solid, high, high, wide, wide, cv2.BORDER_CONSTANT, value=1)
     line = line_along(most + 1, axis)
@@ -289,7 +289,7 @@ def is_short(solid: Picture, most: int, axis: int) -> Truths:
 
 
 def line_along(cells: int, axis: int) -> Picture:
-    """Return a line of so many cells."""
+    """Return a line of this many cells."""
     return np.ones((cells, 1) if axis == 0 else (1, cells), np.uint8)
 
 
@@ -313,7 +313,7 @@ def take_lines(picture: Picture, lines: Places, axis: int) -> Picture:
 
 
 def put_lines(picture: Picture, found: Truths, lines: Places, axis: int) -> None:
-    """Set in these lines of a picture what was found in them."""
+    """Set the cells found in these lines of a picture."""
     here = (slice(None), lines) if axis == 0 else (lines, slice(None))
     picture[here] |= found.astype(np.uint8)
 
@@ -343,7 +343,7 @@ def drop_specks(free: Picture, least: float) -> Picture:
 
 
 def drop_small(solid: Picture, least: float) -> Picture:
-    """Return what is solid without what is smaller across and has floor all around."""
+    """Return solid cells without smaller pieces that have floor all around."""
     framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
     _, label, stats, _ = cv2.connectedComponentsWithStats(framed, connectivity=8)
     across = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
@@ -353,7 +353,7 @@ def drop_small(solid: Picture, least: float) -> Picture:
 
 
 def find_fixed(solid: Picture) -> Picture:
-    """Return what hangs together with the outside of the picture."""
+    """Return the cells connected to the outside of the picture."""
     framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
     _, label = cv2.connectedComponents(framed, connectivity=8)
     return np.asarray(label[1:-1, 1:-1] == label[0, 0], np.uint8)

@@ -1,4 +1,4 @@
-"""What a map looks like once it is divided: regions, the doors between them, and how they join."""
+"""A map divided into regions, with the doors that join them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ Labels = NDArray[np.int16]
 
 
 class RoomClass(StrEnum):
-    """What a person would call a region of the floor."""
+    """Class of a region of the floor, as a person would name it."""
 
     ROOM = "room"
     CORRIDOR = "corridor"
@@ -23,7 +23,7 @@ class RoomClass(StrEnum):
 
 
 SURE = 0.9
-"""A region is sure whose doors are all so certain.
+"""A region is sure if all its doors are at least this certain.
 
 In drawn buildings that nothing was fitted on, .99 of such regions were right, and of the others
 .60; with clutter .98 and .51, with a part unseen .93 and .58.
@@ -47,13 +47,13 @@ class Region:
         id: "R3", "C1" or "O2". The number stays from call to call once regions were matched, and
             no two regions share it; the letter says what the region is now.
         index: The region's number in the label array of its map.
-        free_area_m2: Floor on which nothing stands.
-        floor_area_m2: Floor with what stands on it.
+        free_area_m2: Floor without obstacles.
+        floor_area_m2: Floor with the obstacles on it.
         length_m: The longer side of the smallest rectangle around it; of a corridor, along it.
         width_m: The shorter side; of a corridor, across it.
         heading_rad: Direction of the longer side in the map frame, from 0 up to pi.
         widest: The floor point farthest from any wall; a good place for a label.
-        clearance_m: How far that point is from the nearest wall.
+        clearance_m: Distance of that point from the nearest wall.
     """
 
     id: str
@@ -77,7 +77,7 @@ class Door:
     Attributes:
         id: "D4"; the same from call to call once regions were matched.
         place: The middle of its narrowest line.
-        certainty: How sure it is that two regions meet there and not parts of one, 0 to 1.
+        certainty: That two regions meet there and not parts of one, 0 to 1.
     """
 
     id: str
@@ -88,7 +88,7 @@ class Door:
 
     @property
     def is_likely(self) -> bool:
-        """True where two regions rather meet than parts of one."""
+        """True if two regions probably meet there, and not parts of one."""
         return self.certainty >= LIKELY
 
 
@@ -97,7 +97,7 @@ class Vanished:
     """A region or door of an earlier map that is no longer found.
 
     Attributes:
-        place: Where it was: of a region its widest point.
+        place: Its position; for a region its widest point.
         floor_area_m2: Of a region; None for a door.
         became: The regions that now cover its place; empty when nothing does.
     """
@@ -113,13 +113,13 @@ class RoomMap:
     """A map divided into regions; compared by identity.
 
     Attributes:
-        labels: `Region.index` of each cell of the grid, 0 for no region. Furniture counts to the
-            region it stands in.
+        labels: `Region.index` of each cell of the grid, 0 for no region. Furniture belongs to the
+            region around it.
         regions: Ordered by index, largest first when nothing came before.
-        vanished: Ids of earlier maps that are no longer used; given out again only when the same
-            thing is back in its place.
-        former_ids: What regions were called when they were taken for something else, and what
-            they are called now: {"R3": "C3"}.
+        vanished: Ids of earlier maps that are no longer used; reused only when the same thing is
+            back in its place.
+        former_ids: Former ids of regions whose class has changed, with their present ids:
+            {"R3": "C3"}.
     """
 
     grid: OccupancyGrid
@@ -151,7 +151,7 @@ class RoomMap:
         raise MapError(f"This map has no region {region_id}.", hint=f"Its regions are: {names}.")
 
     def find_region(self, region_id: str) -> Region | None:
-        """Return the region with this id, also one that was called so and is something else now."""
+        """Return the region with this id, even a former id from before its class changed."""
         now = self.former_ids.get(region_id, region_id)
         return next((each for each in self.regions if each.id in (region_id, now)), None)
 
@@ -175,7 +175,7 @@ class RoomMap:
                 slice(rows.start + int(along[0]), rows.start + int(along[-1]) + 1),
                 slice(cols.start + int(across[0]), cols.start + int(across[-1]) + 1),
             )
-            # Where it reaches a side of what was looked at, it may go on beyond.
+            # At a side of the examined part, it may go on beyond.
             is_cut = any(
                 (inner.start == outer.start > 0) or (inner.stop == outer.stop < size)
                 for inner, outer, size in zip(window, (rows, cols), self.labels.shape, strict=True)

@@ -30,15 +30,15 @@ from mapspeak.evaluation.trials import TrialState
 
 EVERY_S = 0.1
 MOST_BYTES = 4_000_000
-"""Of what a program writes; only the last of it is kept."""
+"""Limit of the kept output of a program; only its end is kept."""
 WRAP_UP_S = 10.0
-"""So long before its time is up a program is ended, so that its server can write the map."""
+"""A program is ended this long before its time is up, so that its server can write the map."""
 CONTROL, SERVED = "control", "served"
 """Where in a trial's folder servers write down that they serve."""
 GRACE_S = 5.0
 LAST_WORDS = 500
 LEAST_SECRET = 6
-"""Characters; what is shorter is no secret, and would be struck out all over the text."""
+"""Characters; shorter values are no secrets, and would be struck out all over the text."""
 
 
 @dataclass(slots=True)
@@ -47,8 +47,8 @@ class ProgramRun:
 
     Attributes:
         log: The server's call log; it may not be there yet.
-        over: Why the witness let no more calls be made.
-        n_heard: Calls so far.
+        over: Reason why the witness refused further calls.
+        n_heard: Number of calls so far.
     """
 
     log: Path
@@ -86,7 +86,7 @@ class ProgramRun:
                 # They end by themselves once they have written all they have to write, and are
                 # not killed: their numbers were only read from files.
                 await _await_gone(os.kill, servers, within_s=WRAP_UP_S)
-                # What was written last: nobody is left who could write more.
+                # The last lines: no process is left to write more.
                 with anyio.move_on_after(1.0):
                     await _collect(process.stdout, self.said)
                     await _collect(process.stderr, self.complained)
@@ -188,7 +188,7 @@ async def run_program(
 
 
 def _find_servers(folder: Path) -> tuple[int, ...]:
-    """Return the processes of the servers that serve a trial's robot.
+    """Return the server processes of a trial's robot.
 
     A client program often starts its server as a group of its own.
     """

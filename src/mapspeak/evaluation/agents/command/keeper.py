@@ -1,8 +1,8 @@
-"""Runs a client program, and ends it with all it has started when nobody waits for it any more.
+"""Run a client program, and end it with all its children when its trial's process is gone.
 
 A trial's process may be killed at any moment; a program that asks a model must not go on, and cost,
-without it. This file is started as a script, in a process group of its own: it imports nothing of
-ours. Its standard input says that somebody waits, by being open.
+without it. This file is started as a script, in its own process group, and imports nothing of ours.
+Its standard input is open as long as the trial's process lives.
 """
 
 import os

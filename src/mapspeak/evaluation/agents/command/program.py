@@ -21,7 +21,7 @@ from mapspeak.settings import read_settings
 ANSWER = "answer.txt"
 """The file for last words."""
 SERVER = "robot"
-"""What the server is called in the programs' own settings."""
+"""Name of the server in the programs' own settings."""
 ALWAYS = ("PATH", "HOME", "USER", "LANG", "TMPDIR")
 """Variables every program gets: they hold no secrets, and logins are found by them."""
 VERSION_WITHIN_S = 20.0
@@ -41,24 +41,24 @@ class AnswerForm(StrEnum):
 
 
 class Program(BaseModel):
-    """A client program that works without a person, as data.
+    """Description of a client program that works without a person.
 
     In `command` and `thinking`, {prompt}, {config}, {folder}, {answer}, {thinking}, {server} (the
     server's program, quoted) and {arguments} (its arguments as a JSON list) are filled in.
 
     Attributes:
         command: The program and its arguments.
-        thinking: What follows them where it is said how much to think; empty where it cannot be.
-        config: Where in its folder the server is named, in the usual `mcpServers` JSON.
-        server: What else that JSON says about the server.
+        thinking: Further arguments if a level of thinking is set; empty if not supported.
+        config: File in its folder that names the server, in the usual `mcpServers` JSON.
+        server: Further fields of the server in that JSON.
         environment: Names of variables that are passed on, besides PATH, HOME, USER, LANG, TMPDIR.
-        settings: Variables that are set for it, with their values.
-        answer: Where it leaves its last words.
-        answer_key: Their key, for JSON; parts are joined by dots, * is any key.
-        input_tokens: Keys whose numbers together are the tokens read, for JSON.
-        output_tokens: The same for those written.
-        turns: The same for times that the model was asked.
-        version: What it is called with to say its version; empty where it has no such option.
+        settings: Environment variables to set, with their values.
+        answer: Where it writes its final answer.
+        answer_key: Key of the answer, for JSON; parts are joined by dots, * is any key.
+        input_tokens: Keys whose numbers sum to the input tokens, for JSON.
+        output_tokens: The same for output tokens.
+        turns: The same for requests to the model.
+        version: Option that prints its version; empty without one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -167,7 +167,7 @@ def find_program(name: str) -> Program:
     """Return a program by its name, or from a file (.yaml) that describes it.
 
     Raises:
-        ConfigError: There is none, or the file has a mistake.
+        ConfigError: There is no such program, or the file has a mistake.
     """
     known = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.yaml"))}
     path = known.get(name, Path(name))
@@ -182,7 +182,7 @@ def find_program(name: str) -> Program:
 
 
 def _find_sum(told: object, keys: Iterable[str]) -> int | None:
-    """Return the sum of the numbers under some keys; None where there is none."""
+    """Return the sum of the numbers under some keys; None without any."""
     found = [each for key in keys for each in _find(told, key)]
     numbers = [each for each in found if isinstance(each, int | float)]
     return int(sum(numbers)) if numbers else None

@@ -1,7 +1,7 @@
-"""The model agent: asks a model, makes the calls it wishes for, until it wishes for none.
+"""The model agent: asks a model and makes the calls it requests, until it requests none.
 
-Calls go through our own client, never through one of the model's library: every call is noted,
-counted and held to the trial's limits in one place, whoever the model is.
+Calls go through our own client, never through the model's library: every call is logged, counted
+and limited in one place, for every model.
 """
 
 import io
@@ -37,11 +37,11 @@ INSTEAD = {
 }
 """The answer of a model that ends without a word."""
 WRAP_UP_S = 1.0
-"""So long before its time is up it ends by itself, so that what it has cost is not lost."""
+"""It ends this long before its time is up, so that the record of its cost is not lost."""
 
 
 class Thinking(StrEnum):
-    """How much a model may think before it answers."""
+    """Level of thinking of a model before it answers."""
 
     NONE = "none"
     LOW = "low"
@@ -64,12 +64,12 @@ class ToolCallRequest(ToolCall):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply(TokenCounts):
-    """What a model answers to all that was said.
+    """Reply of a model.
 
     Attributes:
-        calls: Calls that it wants made, in their order; none when it has finished.
-        state: What a reply without calls means: finished by itself, gave up (it refused), or out
-            of budget (it was cut off).
+        calls: Requested calls in order; empty when it has finished.
+        state: Meaning of a reply without calls: finished, gave up (it refused), or out of budget
+            (it was cut off).
     """
 
     text: str
@@ -84,13 +84,13 @@ class ModelConversation(Protocol):
     """The port of models: one conversation, which keeps all that was said in it."""
 
     async def ask(self, answers: AnsweredCalls) -> Reply:
-        """Return the model's answer to all that was said so far.
+        """Return the model's reply to the conversation so far.
 
         Args:
-            answers: To the calls of its last reply, errors as errors; none in the beginning.
+            answers: To the calls of its last reply, errors as errors; empty at the beginning.
 
         Raises:
-            LinkError: The model cannot be reached, or does not take what it was asked.
+            LinkError: The model cannot be reached, or rejects the request.
         """
         ...
 
@@ -111,10 +111,10 @@ def estimate_picture_tokens(picture: Picture) -> int:
 
 @dataclass(slots=True)
 class _Account:
-    """What the conversation has cost so far.
+    """Cost of the conversation so far.
 
     Attributes:
-        n_turns: Times that the model was asked.
+        n_turns: Number of requests to the model.
     """
 
     n_turns: int = 0
@@ -160,7 +160,7 @@ async def _converse(
     conversation: ModelConversation, tools: ToolClient, account: _Account
 ) -> AgentEnd:
     answers: list[tuple[ToolCallRequest, ToolAnswer]] = []
-    n_picture_tokens = 0  # of all pictures said so far: each request has them all
+    n_picture_tokens = 0  # of all pictures so far: each request has them all
     while True:
         reply = await conversation.ask(answers)
         turn = Turn(

@@ -92,19 +92,19 @@ class InspectConversation:
         )
 
     async def ask(self, answers: AnsweredCalls) -> Reply:
-        """Return the model's answer to all that was said so far."""
+        """Return the model's reply to the conversation so far."""
         self._messages += [_as_message(call, answer) for call, answer in answers]
         try:
             output = await self._model.generate(
                 self._messages, tools=self._tools, config=self._config
             )
-        except Exception as error:  # each provider has errors of its own, of no common kind
+        except Exception as error:  # each provider has its own errors, without a common base
             raise LinkError(
                 f"{self._model} cannot be asked: {_say_cause(error)}",
                 hint="See the provider's own words; "
                 f"`{shell_command('eval --retry')}` runs what broke again.",
             ) from error
-        # Said again as it is: some providers want their own thoughts back, signed.
+        # Sent back unchanged: some providers require their own signed thoughts.
         self._messages.append(output.message)
         n_read = n_written = None
         if (usage := output.usage) is not None:
