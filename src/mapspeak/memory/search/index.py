@@ -47,7 +47,7 @@ WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, 
 
 _SAME_NAME, _SAME_WORDS, _SAME_WORDS_MISSPELT = 1.0, 0.99, 0.98
 _MOST_WITHOUT_NAME = 0.97
-"""Similarity of a request with the words of the entry's name; the limit for all others."""
+"""Highest similarity of an entry that the request does not name."""
 
 _LEAST_NAME_LIKENESS = 0.75
 """Similarity from which a request with a misspelt word counts as the name it resembles.
