@@ -342,7 +342,7 @@ def _say_shown(place: Place, shown_ratio: float | None) -> str:
         case Region():
             return f"{shown_ratio:.0%} of the floor of {place.name} is in view."
         case RememberedThing(id=thing_id):
-            return f"{shown_ratio:.0%} of where {thing_id} may be is in view."
+            return f"The picture covers {shown_ratio:.0%} of the area where {thing_id} may be."
         case Door():
             return f"{place.name} is {'' if shown_ratio else 'NOT '}in view."
         case _:

@@ -161,7 +161,7 @@ EXPLORATION_STATES = {
 def say_progress(progress: Progress) -> str:
     """Say why a call of an exploration ended as it did."""
     if progress.seen_id is not None:
-        return f"What {progress.seen_id} promised has been seen from here."
+        return f"Most of what {progress.seen_id} promised has been seen from here."
     match progress.state:
         case ExplorationState.BOUND_REACHED:
             return _say_bound(progress)
