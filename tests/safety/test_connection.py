@@ -275,7 +275,7 @@ async def test_an_action_is_judged_by_the_type_that_the_robot_tells(tmp_path: Pa
     with pytest.raises(PolicyError, match=r"act\.usual_denials: \*/FollowWaypoints"):
         await connection.send_goal("/patrol", {}, type_name="demo_msgs/action/Wave")
     with pytest.raises(PolicyError, match="NavigateToPose"):
-        await connection.send_goal("/errand", {}, type_name="nav2_msgs/action/NavigateToPose")
+        await connection.send_goal("/scope", {}, type_name="nav2_msgs/action/NavigateToPose")
     assert ros.heard == []
     await connection.send_goal("/wave", {}, type_name="demo_msgs/action/Wave")
     assert ros.heard == [("/wave",)]

@@ -1,7 +1,13 @@
 """Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
 
 from mapspeak.hold import Hold
-from mapspeak.safety.approvals import Approvals, Errand, WaitingRoom, covered_by, on_errand
+from mapspeak.safety.approvals import (
+    Approvals,
+    ApprovalScope,
+    WaitingRoom,
+    covered_by,
+    within_scope,
+)
 from mapspeak.safety.audit import (
     NOBODY,
     AuditLine,
@@ -52,6 +58,7 @@ __all__ = [
     "Allowed",
     "Approval",
     "ApprovalNeededError",
+    "ApprovalScope",
     "Approvals",
     "AreaRule",
     "AuditLine",
@@ -62,7 +69,6 @@ __all__ = [
     "CommandKind",
     "Decision",
     "DriveCommand",
-    "Errand",
     "Guard",
     "GuardedConnection",
     "GuardedRobot",
@@ -88,9 +94,9 @@ __all__ = [
     "current_caller",
     "decide",
     "load_policy",
-    "on_errand",
     "publishing_for",
     "read_audit",
     "say_command",
+    "within_scope",
     "zero_velocity_of",
 ]

@@ -14,7 +14,7 @@ from mapspeak.safety.commands import Command, is_same, say_command
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Errand:
+class ApprovalScope:
     """What a call of a tool wants to drive for, and no farther than what.
 
     Attributes:
@@ -31,7 +31,7 @@ class Errand:
 
     @property
     def said(self) -> str:
-        """The errand with its bounds, in words."""
+        """The scope with its bounds, in words."""
         drives = "one drive" if self.n_drives == 1 else f"up to {self.n_drives} drives"
         n_others = f"{self.n_commands} other command{'s' if self.n_commands > 1 else ''}"
         commands = f" and {n_others}" if self.n_commands else ""
@@ -39,22 +39,22 @@ class Errand:
 
 
 # State of a task, not of the module: what the present call is for.
-_ERRAND: ContextVar[Errand | None] = ContextVar("errand", default=None)
+_SCOPE: ContextVar[ApprovalScope | None] = ContextVar("scope", default=None)
 
 
-def current_errand() -> Errand | None:
-    """Return the errand that drives are for now; None where each is for itself."""
-    return _ERRAND.get()
+def current_scope() -> ApprovalScope | None:
+    """Return the scope that drives are for now; None where each is for itself."""
+    return _SCOPE.get()
 
 
 @contextmanager
-def on_errand(errand: Errand) -> Generator[None]:
-    """Mark the drives that are begun in the `with` block as parts of an errand."""
-    token = _ERRAND.set(errand)
+def within_scope(scope: ApprovalScope) -> Generator[None]:
+    """Mark the drives that are begun in the `with` block as parts of a scope."""
+    token = _SCOPE.set(scope)
     try:
         yield
     finally:
-        _ERRAND.reset(token)
+        _SCOPE.reset(token)
 
 
 # Likewise: the person's word for the skill that gives commands now.
@@ -78,7 +78,7 @@ def covered_by(word: str) -> Generator[None]:
 
 @dataclass(slots=True)
 class _Approved:
-    """An errand that a person has agreed to, as far as it is used up."""
+    """A scope that a person has agreed to, as far as it is used up."""
 
     wish_id: str
     begun_s: float
@@ -86,37 +86,37 @@ class _Approved:
     n_commands_left: int
 
 
-class Errands:
-    """The errands that a person has agreed to, of all clients."""
+class ApprovalScopes:
+    """The scopes that a person has agreed to, of all clients."""
 
     def __init__(self) -> None:
-        self._approved: dict[tuple[str, Errand], _Approved] = {}
+        self._approved: dict[tuple[str, ApprovalScope], _Approved] = {}
 
-    def begin(self, errand: Errand, *, client: str, wish_id: str, robot_s: float) -> None:
+    def begin(self, scope: ApprovalScope, *, client: str, wish_id: str, robot_s: float) -> None:
         """Note that a person has agreed; the first drive is yet to be taken."""
-        self._approved[client, errand] = _Approved(
-            wish_id, robot_s, errand.n_drives, errand.n_commands
+        self._approved[client, scope] = _Approved(
+            wish_id, robot_s, scope.n_drives, scope.n_commands
         )
 
     def take_part(
-        self, errand: Errand, *, client: str, robot_s: float, is_drive: bool
+        self, scope: ApprovalScope, *, client: str, robot_s: float, is_drive: bool
     ) -> str | None:
         """Use up one command and return the id of the word that covers it; None where none does."""
-        approved = self._approved.get((client, errand))
+        approved = self._approved.get((client, scope))
         if approved is None:
             return None
-        is_in_time = 0 <= robot_s - approved.begun_s < errand.duration_s
+        is_in_time = 0 <= robot_s - approved.begun_s < scope.duration_s
         n_left = approved.n_left if is_drive else approved.n_commands_left
         if not is_in_time or n_left < 1:
-            del self._approved[client, errand]
+            del self._approved[client, scope]
             return None
         approved.n_left -= is_drive
         approved.n_commands_left -= not is_drive
         return approved.wish_id
 
-    def end(self, errand: Errand, *, client: str) -> None:
+    def end(self, scope: ApprovalScope, *, client: str) -> None:
         """Forget one: what is left of it covers nothing more."""
-        self._approved.pop((client, errand), None)
+        self._approved.pop((client, scope), None)
 
     def end_all(self) -> None:
         """Forget them: after a stop a person is asked again."""
@@ -128,8 +128,8 @@ VALID_S = 600.0
 MOST_WAITING = 50
 
 
-Wanted = Command | Errand
-"""What a person's word may be for: one command, or the drives of an errand."""
+Wanted = Command | ApprovalScope
+"""What a person's word may be for: one command, or the drives of a scope."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -306,10 +306,10 @@ class Approvals:
 
 
 def _is_of(wish: _Wish, wanted: Wanted, client: str) -> bool:
-    if isinstance(wish.wanted, Errand) or isinstance(wanted, Errand):
+    if isinstance(wish.wanted, ApprovalScope) or isinstance(wanted, ApprovalScope):
         return wish.client == client and wish.wanted == wanted
     return wish.client == client and is_same(wish.wanted, wanted)
 
 
 def _say(wanted: Wanted) -> str:
-    return wanted.said if isinstance(wanted, Errand) else say_command(wanted)
+    return wanted.said if isinstance(wanted, ApprovalScope) else say_command(wanted)

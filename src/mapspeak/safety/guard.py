@@ -20,7 +20,13 @@ from mapspeak.places.recall.events import (
     say_events,
     say_unplaced,
 )
-from mapspeak.safety.approvals import Approvals, Errand, Errands, current_errand, current_word
+from mapspeak.safety.approvals import (
+    Approvals,
+    ApprovalScope,
+    ApprovalScopes,
+    current_scope,
+    current_word,
+)
 from mapspeak.safety.audit import AuditLog, Caller, current_caller
 from mapspeak.safety.commands import Command, CommandKind, DriveCommand
 from mapspeak.safety.deciding import Allowed, Decision, NeedsApproval, Refused, Situation, decide
@@ -229,7 +235,7 @@ class Guard:
     robot: str = ""
     address: str = ""
     _rates: RateLog = field(default_factory=RateLog)
-    _errands: Errands = field(default_factory=Errands)
+    _scopes: ApprovalScopes = field(default_factory=ApprovalScopes)
 
     def warn_of_servers(self) -> tuple[str, ...]:
         """Tell of other servers that drive the same robot."""
@@ -308,47 +314,48 @@ class Guard:
         decision = decide(command, policy=self.policy, situation=situation)
         if not isinstance(decision, NeedsApproval):
             return Allowed(by=word) if word and isinstance(decision, Allowed) else decision
-        errand = _errand_of(command)
-        if errand is None:
+        scope = _scope_of(command)
+        if scope is None:
             wish_id = self.approvals.take_word(command, client=caller.client)
         else:
             is_drive = isinstance(command, DriveCommand)
-            wish_id = self._take_part(errand, caller.client, robot_s, is_drive=is_drive)
-            decision = NeedsApproval(question=_ask_for(errand))
+            wish_id = self._take_part(scope, caller.client, robot_s, is_drive=is_drive)
+            question = f"May the robot {scope.said}? The limits of its policy stay."
+            decision = NeedsApproval(question=question)
         if wish_id is None:
             return decision
-        return Allowed(by=wish_id if errand is None else f"{wish_id}: {errand.said}")
+        return Allowed(by=wish_id if scope is None else f"{wish_id}: {scope.said}")
 
     def _take_part(
-        self, errand: Errand, client: str, robot_s: float, *, is_drive: bool
+        self, scope: ApprovalScope, client: str, robot_s: float, *, is_drive: bool
     ) -> str | None:
-        """Return the word that covers one more command of an errand; None where none does."""
+        """Return the word that covers one more command of a scope; None where none does."""
         take = partial(
-            self._errands.take_part, errand, client=client, robot_s=robot_s, is_drive=is_drive
+            self._scopes.take_part, scope, client=client, robot_s=robot_s, is_drive=is_drive
         )
         wish_id = take()
         if wish_id is not None:
             return wish_id
-        wish_id = self.approvals.take_word(errand, client=client)
+        wish_id = self.approvals.take_word(scope, client=client)
         if wish_id is None:
             return None
-        self._errands.begin(errand, client=client, wish_id=wish_id, robot_s=robot_s)
+        self._scopes.begin(scope, client=client, wish_id=wish_id, robot_s=robot_s)
         return take()
 
-    def end_errands(self) -> None:
-        """Let a person be asked again for what is left of errands: the robot was stopped."""
-        self._errands.end_all()
+    def end_scopes(self) -> None:
+        """Let a person be asked again for what is left of scopes: the robot was stopped."""
+        self._scopes.end_all()
 
-    def end_errand(self, errand: Errand) -> None:
-        """Forget what is left of an errand: it is done."""
-        self._errands.end(errand, client=current_caller().client)
+    def end_scope(self, scope: ApprovalScope) -> None:
+        """Forget what is left of a scope: it is done."""
+        self._scopes.end(scope, client=current_caller().client)
 
     def _situation(self, command: Command, robot_s: float) -> Situation:
         n_lately = self._rates.count(command.kind, robot_s)
         return Situation(held_by=self.hold.read(), n_in_last_minute=n_lately)
 
     def _ask(self, command: Command, question: str, caller: Caller) -> ApprovalNeededError:
-        wish_id = self.approvals.ask(_errand_of(command) or command, client=caller.client)
+        wish_id = self.approvals.ask(_scope_of(command) or command, client=caller.client)
         hint = "The client cannot ask anybody: tell the person that the policy wants their word."
         if self.policy.approval.otherwise is Otherwise.QUEUE:
             self.approvals.queue(wish_id)
@@ -386,12 +393,8 @@ def _say_decision(decision: Decision) -> tuple[str, str]:
             return "allowed", f"by approval {by}" if by else ""
 
 
-def _errand_of(command: Command) -> Errand | None:
+def _scope_of(command: Command) -> ApprovalScope | None:
     """Return what a command is a part of; None for one that is for itself."""
-    errand = current_errand()
-    is_part = errand is not None and (isinstance(command, DriveCommand) or errand.n_commands > 0)
-    return errand if is_part else None
-
-
-def _ask_for(errand: Errand) -> str:
-    return f"May the robot {errand.said}? The limits of its policy stay."
+    scope = current_scope()
+    is_part = scope is not None and (isinstance(command, DriveCommand) or scope.n_commands > 0)
+    return scope if is_part else None

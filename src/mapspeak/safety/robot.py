@@ -328,7 +328,7 @@ class GuardedRobot:
 
     async def _stop(self, why: str) -> None:
         self._n_stops += 1
-        self._guard.end_errands()
+        self._guard.end_scopes()
         if self._drive is not None:
             self._give_up_legs(self._drive, CauseCode.STOPPED)
         try:

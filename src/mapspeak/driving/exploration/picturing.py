@@ -13,13 +13,13 @@ from mapspeak.memory import PictureBook
 from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
 from mapspeak.places.views.headings import aim_for_picture, face_new_walls, find_room_near
 from mapspeak.robot import GoalState
-from mapspeak.safety import Errand
+from mapspeak.safety import ApprovalScope
 
 TURN_S = 10.0
 """Robot time that a turn on arrival may take."""
 MOST_DRIVES = 4
 """To the goal, to where it fits after more of it is mapped, and the turn."""
-ERRAND_S = 600.0
+SCOPE_S = 600.0
 
 
 class PictureContext(TripContext, Protocol):
@@ -39,10 +39,10 @@ async def aim(site: PictureContext, goal: CheckedGoal) -> CheckedGoal:
     return await site.compute(partial(aim_for_picture, world, goal, views))
 
 
-def errand_of(place: str) -> Errand:
+def scope_of(place: str) -> ApprovalScope:
     """Return what a person agrees to at once: the drive to a place, and what ends it there."""
     what = f"drive to {place} and turn there to look"
-    return Errand(what=what, n_drives=MOST_DRIVES, duration_s=ERRAND_S)
+    return ApprovalScope(what=what, n_drives=MOST_DRIVES, duration_s=SCOPE_S)
 
 
 async def end_for_picture(

@@ -8,13 +8,13 @@ from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration.picturing import aim, end_for_picture, errand_of
+from mapspeak.driving.exploration.picturing import aim, end_for_picture, scope_of
 from mapspeak.driving.exploration.trips import spread_headings, turn_to
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.places.views.sights import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
-from mapspeak.safety import Errand, on_errand
+from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.robot import DriveAnswer
 from mapspeak.server.text.descriptions import describe_view
 from mapspeak.server.text.drives import not_stopped, say_cause
@@ -111,7 +111,7 @@ class DriveTools:
                 place=place, x=x, y=y, yaw_deg=yaw_deg, as_near=as_near
             )
             goal = await aim(self._session, goal)
-            with _errand_of(goal.title, goal.purpose):
+            with _scope_of(goal.title, goal.purpose):
                 drive = await drives.start(
                     goal.pose,
                     place=goal.title,
@@ -167,7 +167,7 @@ class DriveTools:
         drive = report.drive
         if wait_s > 0 and drive.client == client_of(context):
             left_s = max(until_s - robot.now_s, 0.0)
-            with _errand_of(drive.place, drive.purpose):
+            with _scope_of(drive.place, drive.purpose):
                 report = await end_for_picture(
                     self._session, report, wait_s=left_s, on_progress=on_progress
                 )
@@ -250,13 +250,13 @@ class ViewTools:
         first = await look_ahead(self._session)
         n_pictures = n_pictures or _count_all_around(first.picture)
         what = f"turn in place for {n_pictures} pictures"
-        errand = Errand(what=what, n_drives=n_pictures - 1, duration_s=LONGEST_WAIT_S)
+        scope = ApprovalScope(what=what, n_drives=n_pictures - 1, duration_s=LONGEST_WAIT_S)
         shown: list[str | Image] = [first.text, first.image]
         for yaw_rad in spread_headings(first.picture.pose.yaw_rad, n_pictures)[1:]:
             left_s = deadline_s - robot.now_s
             if left_s < LEAST_TURN_S:
                 return [*shown, _say_rest(yaw_rad, "the time for one call is over")]
-            with on_errand(errand):
+            with within_scope(scope):
                 report = await self._turn(context, yaw_rad, left_s)
             if report.status.state is not GoalState.ARRIVED:
                 await self._session.drives.cancel(report.drive.goal_id)
@@ -276,9 +276,9 @@ class ViewTools:
         )
 
 
-def _errand_of(place: str, purpose: GoalPurpose) -> AbstractContextManager[None]:
+def _scope_of(place: str, purpose: GoalPurpose) -> AbstractContextManager[None]:
     """Let one word of a person do for a drive and the turn at its end."""
-    return on_errand(errand_of(place)) if purpose is GoalPurpose.LOOK else nullcontext()
+    return within_scope(scope_of(place)) if purpose is GoalPurpose.LOOK else nullcontext()
 
 
 def _say_no_view(report: DriveReport) -> str:

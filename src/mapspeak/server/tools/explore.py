@@ -17,7 +17,7 @@ from mapspeak.driving.search.progress import Budget
 from mapspeak.driving.search.searcher import Judgement, Searcher
 from mapspeak.errors import LinkError, SemanticMapError
 from mapspeak.memory import TakenPicture
-from mapspeak.safety import Errand, on_errand
+from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports.maps import Report
 from mapspeak.server.text.wording import shorten
@@ -127,7 +127,7 @@ class ExploreTools:
         )
         if bounds.for_camera:
             self._require_camera()
-        with on_errand(_exploring(n_goals, duration_s)):
+        with within_scope(_exploring(n_goals, duration_s)):
             progress = await self._explorer.advance(
                 bounds, wait_s=wait_s, on_trip=tell_progress(context), client=client_of(context)
             )
@@ -157,7 +157,7 @@ class ExploreTools:
         lead it.
         """
         self._require_camera()
-        with on_errand(_searching(thing, max_looks, max_m)):
+        with within_scope(_searching(thing, max_looks, max_m)):
             standing = await self._searcher.advance(
                 thing,
                 Judgement(is_seen=seen, likely=likely, scores=scores or {}),
@@ -194,18 +194,18 @@ class ExploreTools:
         return await look_ahead(self._session) if robot.description.has_camera else None
 
 
-def _exploring(n_goals: int | None, duration_s: float | None) -> Errand:
+def _exploring(n_goals: int | None, duration_s: float | None) -> ApprovalScope:
     """Return the command to approve; where the call has no bound, the approval has one."""
-    return Errand(
+    return ApprovalScope(
         what="explore",
         n_drives=USUAL_DRIVES if n_goals is None else n_goals,
         duration_s=USUAL_DURATION_S if duration_s is None else duration_s,
     )
 
 
-def _searching(thing: str, max_looks: int, max_m: float) -> Errand:
+def _searching(thing: str, max_looks: int, max_m: float) -> ApprovalScope:
     what = f"search for {shorten(thing)!r}, up to {max_m:g} m"
-    return Errand(what=what, n_drives=max_looks, duration_s=USUAL_DURATION_S)
+    return ApprovalScope(what=what, n_drives=max_looks, duration_s=USUAL_DURATION_S)
 
 
 def _answer(report: Report, sighting: CameraSighting | None) -> CallToolResult:

@@ -10,7 +10,7 @@ from pydantic import Field
 from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
 from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan
-from mapspeak.safety import Errand, on_errand
+from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.routes import RouteAnswer
 from mapspeak.server.text.wording import shorten
 from mapspeak.server.tools.asking import (
@@ -25,7 +25,7 @@ from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 MOST_STOPS = 20
-ERRAND_S = 1800.0
+SCOPE_S = 1800.0
 """Robot time for which a person's approval of a route is valid."""
 
 Stops = Annotated[
@@ -59,7 +59,7 @@ class RouteTools:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._routes = RouteBook(session)
-        self._errand = Errand(what="follow a route", n_drives=0, duration_s=ERRAND_S)
+        self._scope = ApprovalScope(what="follow a route", n_drives=0, duration_s=SCOPE_S)
         self._looks_around = False
         self._views = ViewTools(session)
 
@@ -96,8 +96,8 @@ class RouteTools:
                 end_at=end_at,
             )
             self._looks_around = look_around
-            self._errand = _errand_of(stops, plan, looks_around=look_around)
-        with on_errand(self._errand):
+            self._scope = _scope_of(stops, plan, looks_around=look_around)
+        with within_scope(self._scope):
             progress = await self._routes.advance(
                 wait_s=wait_s,
                 when_blocked=when_blocked,
@@ -119,12 +119,12 @@ class RouteTools:
         return [sighting.text, sighting.image]
 
 
-def _errand_of(stops: Sequence[str], plan: RoutePlan, *, looks_around: bool) -> Errand:
+def _scope_of(stops: Sequence[str], plan: RoutePlan, *, looks_around: bool) -> ApprovalScope:
     """Return the commands to approve: the drives to all stops, and the turns at them."""
     past = f"drive past {'; '.join(shorten(each) for each in stops)}"
     what = f"{past} and look around at each" if looks_around else past
     n_turns = MOST_PICTURES if looks_around else 0
-    return Errand(what=what, n_drives=len(plan.stops) * (1 + n_turns), duration_s=ERRAND_S)
+    return ApprovalScope(what=what, n_drives=len(plan.stops) * (1 + n_turns), duration_s=SCOPE_S)
 
 
 def _as_content(shown: str | Image) -> TextContent | ImageContent:

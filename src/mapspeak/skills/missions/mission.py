@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from contextvars import ContextVar
 
 from mapspeak.errors import SkillError
-from mapspeak.safety import CommandKind, Errand, Guard, RunSkill, on_errand
+from mapspeak.safety import ApprovalScope, CommandKind, Guard, RunSkill, within_scope
 from mapspeak.skill import (
     JsonValue,
     OnProgress,
@@ -114,13 +114,13 @@ class MissionSkill:
     async def _begin(
         self, given: Mapping[str, JsonValue], bounds: MissionBounds, on_progress: OnProgress
     ) -> SkillOutcome:
-        desk, errand = self._desk, self._errand(bounds, given)
+        desk, scope = self._desk, self._scope(bounds, given)
         unmet = await find_unmet(self.spec.preconditions, desk.facts)
         if unmet is not None:
             return SkillOutcome(state=SkillState.FAILED, code=SkillCode.PRECONDITION, failed=unmet)
         token = _IS_WITHIN.set(True)
         try:
-            with on_errand(errand):
+            with within_scope(scope):
                 said = "cut off"
                 permit = None
                 if desk.guard is not None:
@@ -138,7 +138,7 @@ class MissionSkill:
                     desk.record.end(str(said))
                     if desk.guard is not None and permit is not None:
                         desk.guard.note_result(permit, said, robot_s=desk.facts.now_s)
-                        desk.guard.end_errand(errand)
+                        desk.guard.end_scope(scope)
         finally:
             _IS_WITHIN.reset(token)
         return outcome or SkillOutcome(
@@ -161,7 +161,7 @@ class MissionSkill:
         )
         return await runner.run()
 
-    def _errand(self, bounds: MissionBounds, given: Mapping[str, JsonValue]) -> Errand:
+    def _scope(self, bounds: MissionBounds, given: Mapping[str, JsonValue]) -> ApprovalScope:
         """Return the subject of an approval: this tree with these arguments, and no other one."""
         leaves = [
             " ".join(filter(None, (step.skill, plain(step.main or ""))))
@@ -174,7 +174,7 @@ class MissionSkill:
         exact = json.dumps([repr(self.plan.tree), given], default=str, sort_keys=True)
         digest = hashlib.sha256(exact.encode()).hexdigest()[:8]
         asked = f"; asks for {', '.join(sorted(bounds.asked))}" if bounds.asked else ""
-        return Errand(
+        return ApprovalScope(
             what=f"run the mission {self.spec.name}{with_what} ({told}{asked}; {digest})",
             n_drives=bounds.n_drives,
             duration_s=self.spec.timeout_s,

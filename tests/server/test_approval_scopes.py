@@ -144,8 +144,8 @@ async def test_one_word_covers_a_drive_to_look_and_the_turn_at_its_end(tmp_path:
         await client.call_tool("wait_for_goal", {})
     assert len(robot.goals) == 2
     (question,) = person.questions
-    errand = "drive to F1 and turn there to look, up to 4 drives within 600 s"
-    assert question == f"May the robot {errand}? {LIMITS}"
+    scope = "drive to F1 and turn there to look, up to 4 drives within 600 s"
+    assert question == f"May the robot {scope}? {LIMITS}"
 
 
 async def test_after_a_stop_a_person_is_asked_again(tmp_path: Path) -> None:
