@@ -73,5 +73,6 @@ class ServerProcess:
     def close(self) -> None:
         """End the server as clients do, and wait for it."""
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
-        self._process.stdin.close()
-        self._process.wait(timeout=300)
+        with self._process:
+            self._process.stdin.close()
+            self._process.wait(timeout=300)
