@@ -111,6 +111,8 @@ async def test_another_page_is_told_what_a_person_does(tmp_path: Path) -> None:
         browse(live.address) as page,
         browse(live.address) as other,
     ):
+        # Who opens a page hears what happens from then on.
+        await expect(other.locator("#state")).to_contain_text("x 1.50")
         await page.click("#stop")
         await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
         await expect(other.locator("#said")).to_have_text("a person: The robot was told to stop.")
