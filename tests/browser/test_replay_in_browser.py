@@ -114,6 +114,8 @@ def shown() -> str:
 @pytest.mark.skipif(RUN not in os.environ, reason="needs the folder of a demo")
 async def test_a_demo_is_replayed(shown: str) -> None:
     async with browse(f"{shown}#step-68") as page:
+        seen = await page.locator("text=/^seen in step [0-9]+$/").inner_text()
+    async with browse(f"{shown}#step-{seen.split()[-1]}") as page:
         await expect(page.locator("#calls details[open] img")).to_be_visible()
         if KEEP in os.environ:
             await page.screenshot(path=PICTURES / "replay.png")

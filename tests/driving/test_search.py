@@ -148,8 +148,8 @@ async def test_a_remembered_thing_is_looked_at_from_where_the_robot_faces_it(
     assert (first.here.kind, first.here.id) == (CandidateKind.REMEMBERED, "T1")
     # Seen once and from afar, it is looked for from where most of where it may be is in view.
     there = Point(3.5, 0.0)
-    assert first.pose.point.distance_to(there) < 6.0
-    assert abs(wrap_angle(first.pose.point.bearing_to(there) - first.pose.yaw_rad)) < 0.6
+    assert first.pose.point.distance_to(there) < 4.5
+    assert abs(wrap_angle(first.pose.point.bearing_to(there) - first.pose.yaw_rad)) < 0.35
 
 
 async def test_each_place_that_names_the_thing_is_looked_at_once(
