@@ -189,6 +189,21 @@ async def test_a_goal_of_somebody_else_is_not_taken_away_again(tmp_path: Path) -
     assert session.drives.latest.goal_id == other.goal_id
 
 
+async def test_a_drive_of_the_same_client_in_between_does_not_end_the_exploration(
+    tmp_path: Path,
+) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    session = session_of(robot, tmp_path)
+    explorer = Explorer(session)
+    await explorer.advance(None, wait_s=1.0, on_trip=_tell_nobody)
+    with session.drives.preparing() as ticket:
+        own = await session.drives.start(Pose(0.5, 0.0), place="there", ticket=ticket)
+    await session.drives.wait(own.goal_id, wait_s=30.0, on_progress=_tell_nobody)
+    again = await _explore(explorer)
+    assert again.state is ExplorationState.NOTHING_LEFT
+    assert again.n_goals == again.n_arrived + again.n_seen + again.n_blocked
+
+
 async def test_who_gives_up_waiting_leaves_the_robot_standing(tmp_path: Path) -> None:
     robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
     session = session_of(robot, tmp_path)

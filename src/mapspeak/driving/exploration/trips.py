@@ -105,6 +105,8 @@ class TripState(StrEnum):
     ARRIVED = "arrived"
     BLOCKED = "blocked"
     INTERRUPTED = "interrupted"
+    REPLACED = "replaced"
+    """The client that explores sent the robot elsewhere meanwhile, and that drive has ended."""
 
 
 class Trips:
@@ -203,12 +205,22 @@ class Trips:
             self.n_arrived += 1
             self.blocked.forget(trip.target.pose.point)
             return TripState.ARRIVED
+        if self._is_replaced_by_own(report):
+            self.n_begun -= 1
+            return TripState.REPLACED
         self.end = TripEnd(goal_id=trip.goal_id, goal_state=status.state, cause=status.cause)
         if status.state in (GoalState.CANCELLED, GoalState.PREEMPTED):
             return TripState.INTERRUPTED
         self.n_blocked += 1
         self._remember_blocked(trip.target, self.end, report.pose, grid)
         return TripState.BLOCKED
+
+    def _is_replaced_by_own(self, report: DriveReport) -> bool:
+        """Return True when the same client drove elsewhere meanwhile, and that drive has ended."""
+        cause, latest = report.status.cause, self._site.drives.latest
+        is_own = latest is not None and latest.client == report.drive.client
+        is_replaced = cause is not None and cause.code is CauseCode.REPLACED
+        return is_replaced and is_own and self._site.drives.under_way is None
 
     def _take_in_refusal(
         self, target: Target, why: str, *, ticket: int, grid: OccupancyGrid

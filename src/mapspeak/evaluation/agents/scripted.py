@@ -77,9 +77,11 @@ async def _explore(driver: ToolDriver, _match: re.Match[str]) -> AgentEnd:
     Where it has not looked around near by it looks to all sides, for what no wall is behind.
     """
     looked_from: list[Point] = []
+    state = ""
     for _ in range(MOST_STOPS):
         here = (await driver.find_pose()).point
-        if all(here.distance_to(place) >= LOOK_AROUND_EVERY_M for place in looked_from):
+        is_new = all(here.distance_to(place) >= LOOK_AROUND_EVERY_M for place in looked_from)
+        if state != "driving" and is_new:
             looked_from.append(here)
             await driver.record_around()
         answer = await driver.tools.demand(
@@ -87,9 +89,10 @@ async def _explore(driver: ToolDriver, _match: re.Match[str]) -> AgentEnd:
         )
         if answer.pictures:
             await driver.record(driver.note(answer.text))
-        if answer.report["state"] not in ("driving", "at_goal"):
+        state = answer.report["state"]
+        if state not in ("driving", "at_goal"):
             break
-    return AgentEnd(answer="Everything that can be reached is on the map.")
+    return AgentEnd(answer=f"I explored: {state}. {answer.report['reason']}")
 
 
 # --- rooms ---------------------------------------------------------------------------------------
