@@ -24,7 +24,7 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import PageKeys
-from mapspeak.server.view.serving import serve_view
+from mapspeak.server.view.site import serve_view
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.spatial import OccupancyGrid

@@ -2,7 +2,7 @@
 
 import json
 import socket
-from collections.abc import AsyncGenerator, AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +21,7 @@ from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import PageKeys
-from mapspeak.server.view.serving import serve_view
+from mapspeak.server.view.site import serve_view
 from mapspeak.session import Session
 
 PATIENCE_S = 120.0
@@ -67,6 +67,27 @@ class Live:
             return data
 
 
+@asynccontextmanager
+async def serve_page(
+    feeds: Mapping[str, ViewFeed], keys: PageKeys, *work: Callable[[], Coroutine[Any, Any, None]]
+) -> AsyncGenerator[str]:
+    """Serve the page of some robots while other work goes on; give its address."""
+    address, is_ready = find_free_address(), anyio.Event()
+
+    async def serve() -> None:
+        def tell(_address: str) -> None:
+            is_ready.set()
+
+        await serve_view(feeds, address, keys=keys, on_ready=tell)
+
+    async with anyio.create_task_group() as tasks:
+        for each in (serve, *work):
+            tasks.start_soon(each)
+        await is_ready.wait()
+        yield f"http://{address}"
+        tasks.cancel_scope.cancel()
+
+
 async def _read_events(answer: httpx2.Response) -> AsyncIterator[tuple[str, Any]]:
     kind = ""
     async for line in answer.aiter_lines():
@@ -100,27 +121,19 @@ async def serve_live(
     session_type: type[Session] = Session,
 ) -> AsyncGenerator[Live]:
     """Serve a robot to a client, and its live page."""
-    address = find_free_address()
     robot = robot or FakeRobot(two_rooms())
     guard = guard or make_guard(folder)
     store = SemanticMapStore(folder / "m.yaml", map_id="two-rooms")
     session = session_type(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
-    calls, tokens, is_ready = CallFeed(), list[str](), anyio.Event()
-    feeds, keys = {"": ViewFeed(session, calls)}, PageKeys(tokens.append, wrong_s=0.0)
+    feed, tokens = ViewFeed(session, CallFeed()), list[str]()
+    server = build_server(session, toolsets=toolsets, call_log=feed.calls)
+    feed.book = server.book
     with anyio.fail_after(PATIENCE_S):
         async with (
-            anyio.create_task_group() as tasks,
-            Client(build_server(session, toolsets=toolsets, call_log=calls)) as client,
-            httpx2.AsyncClient(base_url=f"http://{address}", timeout=PATIENCE_S) as http,
+            serve_page(
+                {"": feed}, PageKeys(tokens.append, wrong_s=0.0), server.keep_skills
+            ) as address,
+            Client(server) as client,
+            httpx2.AsyncClient(base_url=address, timeout=PATIENCE_S) as http,
         ):
-
-            async def serve() -> None:
-                def tell(_address: str) -> None:
-                    is_ready.set()
-
-                await serve_view(feeds, address, keys=keys, on_ready=tell)
-
-            tasks.start_soon(serve)
-            await is_ready.wait()
-            yield Live(http, client, session, robot, f"http://{address}/", tokens)
-            tasks.cancel_scope.cancel()
+            yield Live(http, client, session, robot, f"{address}/", tokens)

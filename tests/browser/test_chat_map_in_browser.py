@@ -199,9 +199,9 @@ async def test_an_exploration_is_shown_in_the_chat(tmp_path: Path) -> None:
         for _ in range(4):
             await chat.client.call_tool("navigate_to", {"place": "nearest frontier"})
             await chat.client.call_tool("look_at_map", {})
-        await expect(app.locator("#items")).to_contain_text("F")
+        await expect(app.locator("#items")).to_contain_text("frontier")
         await app.locator("#index summary").click()
-        await app.locator("#items").get_by_role("button", name="F").first.click()
+        await app.locator("#items").get_by_role("button", name="frontier").first.click()
         await expect(app.get_by_role("button", name="Go to F")).to_be_visible()
         await app.locator("#index summary").click()
         if KEEP in os.environ:

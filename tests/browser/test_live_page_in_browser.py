@@ -4,17 +4,25 @@ import os
 import sys
 from collections.abc import AsyncGenerator
 from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import anyio
+import numpy as np
 import pytest
 from anyio.abc import Process
 
+from fakes import FakeRobot, two_rooms
 from guarding import make_guard
-from livepage import Live, find_free_address, serve_live
+from livepage import Live, find_free_address, serve_live, serve_page
 from mapspeak.links.simulated import SoloRobot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
+from mapspeak.server.view.calls import CallFeed
+from mapspeak.server.view.feed import ViewFeed
+from mapspeak.server.view.keys import PageKeys
+from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 
 playwright_api = pytest.importorskip("playwright.async_api")
@@ -116,6 +124,92 @@ async def test_another_page_is_told_what_a_person_does(tmp_path: Path) -> None:
         await page.click("#stop")
         await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
         await expect(other.locator("#said")).to_have_text("a person: The robot was told to stop.")
+
+
+async def test_two_robots_are_stopped_one_by_one_and_all_at_once(tmp_path: Path) -> None:
+    robots = {name: FakeRobot(two_rooms()) for name in ("ada", "ben")}
+    feeds = {}
+    for name, robot in robots.items():
+        store = SemanticMapStore(tmp_path / f"{name}.yaml")
+        session = Session(robot, store, lease_s=60.0, find_model=lambda: None)
+        feeds[name] = ViewFeed(session, CallFeed())
+    keys = PageKeys(lambda _: None)
+    async with serve_page(feeds, keys) as address, browse(f"{address}/?robot=ben") as page:
+        await expect(page.locator("#stop")).to_have_text("STOP ben")
+        await page.click("#stop")
+        await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
+        assert [robot.n_stops for robot in robots.values()] == [0, 1]
+        await page.select_option("#robots", "ada")
+        await expect(page.locator("#stop")).to_have_text("STOP ada")
+        await page.click("#stop-all")
+        await expect(page.locator("#said")).to_contain_text("ben: The robot was told to stop.")
+        assert [robot.n_stops for robot in robots.values()] == [1, 2]
+        await page.evaluate("byId('said').textContent = ''")
+        await page.locator("body").press("s")
+        await expect(page.locator("#said")).to_contain_text("ada: The robot was told to stop.")
+        assert [robot.n_stops for robot in robots.values()] == [2, 3]
+
+
+async def test_a_page_that_is_left_open_keeps_to_its_bounds_and_comes_back(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        state, calls = page.locator("#state"), page.locator("#calls li")
+        await expect(state).to_contain_text("x 1.50")
+        for _ in range(105):
+            await live.client.call_tool("get_robot_pose", {})
+        await expect(calls).to_have_count(100)
+        await expect(calls.first).to_contain_text("105 get_robot_pose")
+        await expect(calls.first).to_contain_text("s ago, took")
+        # As when the machine of the page has slept.
+        await page.evaluate("""() => {
+          const before = performance.now.bind(performance);
+          performance.now = () => before() + 8 * 3600 * 1000;
+        }""")
+        await expect(calls.first).to_contain_text("8 h ago")
+        await live.client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        await expect(state).not_to_contain_text("does not answer")
+        await expect(state).to_contain_text("G1 to R2")
+        await page.click("#stop")
+        await expect(page.locator("#said")).to_have_text("The robot was told to stop.")
+
+
+async def test_the_view_grows_with_the_map_until_a_person_moves_it(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live, browse(live.address) as page:
+        scale = page.locator(".leaflet-control-scale-line")
+
+        async def grow() -> None:
+            grid = live.robot.grid
+            cells = np.pad(grid.cells, ((0, 2 * grid.n_rows), (0, 2 * grid.n_cols)))
+            live.robot.grid = replace(grid, cells=cells)
+
+        await expect(page.locator("#map img.leaflet-image-layer")).to_have_count(1)
+        before = await scale.inner_text()
+        await grow()
+        await expect(scale).not_to_have_text(before)
+        await page.click(".leaflet-control-zoom-in")
+        await page.click(".leaflet-control-zoom-in")
+        await expect(page.locator(".leaflet-zoom-anim")).to_have_count(0)
+        moved = await scale.inner_text()
+        await grow()
+        await expect(page.locator("#state")).to_contain_text("map changed 0 s ago")
+        assert await scale.inner_text() == moved
+        await page.click(".whole")
+        await expect(scale).not_to_have_text(moved)
+
+
+async def test_a_mission_is_drawn_as_a_tree(tmp_path: Path) -> None:
+    tree = "- wait: 1\n- ask: Is it open?\n"
+    tools = ("drive", "missions")
+    async with serve_live(tmp_path, toolsets=tools) as live, browse(live.address) as page:
+        await live.client.call_tool("save_mission", {"name": "patrol", "tree": tree})
+        await live.client.call_tool("run_mission", {"name": "patrol"})
+        missions = page.locator("#missions")
+        await expect(missions).to_contain_text("Mission under way: patrol")
+        await expect(missions.locator("li.succeeded")).to_have_text("✓ wait 1 succeeded")
+        await expect(missions.locator("li.running")).to_have_text('▶ ask "Is it open?" running')
+        await expect(missions).to_contain_text('Asks Q1: "Is it open?"')
+        await live.client.call_tool("answer_mission", {"answer": "yes"})
+        await expect(missions).to_contain_text("Last mission: patrol")
+        await expect(missions).to_contain_text("Saved mission: patrol")
 
 
 async def test_what_waits_is_approved_and_refused(tmp_path: Path) -> None:

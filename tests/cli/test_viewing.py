@@ -14,8 +14,7 @@ from mapspeak.cli import cli
 from mapspeak.cli.viewing import make_page
 from mapspeak.errors import MapspeakError
 from mapspeak.memory import SemanticMapStore
-from mapspeak.server.view.desk import ViewDesk, ViewRequest
-from mapspeak.server.view.keys import PageKeys
+from mapspeak.server.view.keys import PageKeys, ViewDesk, ViewRequest
 from mapspeak.session import Session
 from reportmaking import make_trial, write_trial
 

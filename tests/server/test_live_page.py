@@ -6,6 +6,7 @@ import math
 import re
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Never
 
 import anyio
 import numpy as np
@@ -16,10 +17,11 @@ from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from livepage import next_of, serve_live
 from mapspeak.errors import ConfigError, LinkError, MapError
-from mapspeak.robot import StampedPose
+from mapspeak.robot import CameraPicture, RobotDescription, StampedPose
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
+from mapspeak.safety.approvals import VALID_S
 from mapspeak.server.view.keys import PageKeys
-from mapspeak.server.view.serving import serve_view
+from mapspeak.server.view.site import serve_view
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
@@ -116,6 +118,70 @@ async def test_a_robot_that_is_lost_is_told_with_why(tmp_path: Path) -> None:
 
     async with serve_live(tmp_path, Lost(two_rooms())) as live:
         assert "does not answer" in (await live.wait_for("robot", "fault"))["fault"]
+
+
+async def test_a_robot_that_is_not_there_yet_has_a_page_that_says_so(tmp_path: Path) -> None:
+    class Absent(FakeRobot):
+        is_there = True
+
+        @property
+        def description(self) -> RobotDescription:
+            return super().description if self.is_there else self._refuse()
+
+        async def fetch_pose(self) -> StampedPose:
+            return await super().fetch_pose() if self.is_there else self._refuse()
+
+        async def stop(self) -> None:
+            self._refuse()
+
+        def _refuse(self) -> Never:
+            raise LinkError("There is no robot yet.", hint="Start it.")
+
+    robot = Absent(two_rooms())
+    async with serve_live(tmp_path, robot) as live:
+        robot.is_there = False
+        assert "no robot yet" in (await live.wait_for("robot", "fault"))["fault"]
+        assert (await live.http.get("/robots/robot/camera")).status_code == 503
+        answer = await live.command("stop")
+        assert (answer.status_code, "NOT STOPPED" in answer.text) == (409, True)
+        await live.unlock()
+        assert (await live.command("drive", x=1.0, y=1.0)).status_code == 409
+
+
+async def test_many_pages_are_given_the_same_picture_of_the_camera(tmp_path: Path) -> None:
+    class Slow(FakeRobot):
+        n_pictures = 0
+
+        async def fetch_picture(self) -> CameraPicture:
+            self.n_pictures += 1
+            await may_come.wait()
+            return await super().fetch_picture()
+
+    may_come, robot = anyio.Event(), Slow(two_rooms())
+    async with serve_live(tmp_path, robot) as live, anyio.create_task_group() as tasks:
+        for _ in range(10):
+            tasks.start_soon(live.http.get, "/robots/robot/camera")
+        await live.wait_for("alive")
+        may_come.set()
+    assert robot.n_pictures <= 2
+
+
+async def test_a_mission_is_drawn_with_the_state_of_each_step_and_what_it_asks(
+    tmp_path: Path,
+) -> None:
+    tree = "- wait: 1\n- ask: Is it open?\n  answers: ['yes', 'no']\n- wait: 2\n"
+    async with serve_live(tmp_path, toolsets=("drive", "missions")) as live:
+        await live.client.call_tool("save_mission", {"name": "patrol", "tree": tree})
+        await live.client.call_tool("run_mission", {"name": "patrol"})
+        asking = await live.wait_for("missions", "questions")
+        await live.client.call_tool("answer_mission", {"answer": "yes"})
+        await live.client.call_tool("skill_status", {"wait_s": 20})
+        ended = await live.wait_for("missions", "is_over")
+    assert asking["latest"]["tree"]["steps"][0]["said"] == "wait 1"
+    assert asking["states"] == {"2": "succeeded", "3": "running"}
+    assert "Is it open?" in asking["questions"][0]
+    assert ended["states"] == {"2": "succeeded", "3": "succeeded", "4": "succeeded"}
+    assert [each["name"] for each in ended["saved"]] == ["patrol"]
 
 
 async def test_the_camera_is_shown_where_there_is_one(tmp_path: Path) -> None:
@@ -292,6 +358,21 @@ async def test_a_waiting_command_is_shown_and_approved_once(tmp_path: Path) -> N
         driven = await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert not driven.is_error
     assert len(live.robot.goals) == 1
+
+
+async def test_an_approval_that_has_run_out_is_neither_shown_nor_given(tmp_path: Path) -> None:
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
+    guard = make_guard(tmp_path, Policy(approval=approval))
+    async with serve_live(tmp_path, guard=guard) as live:
+        await live.unlock()
+        await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+        ((wish, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
+        guard.approvals.now_s = lambda: VALID_S + 60.0
+        answer = await live.command("approve", id=wish)
+        async with live.hear() as events:
+            while (await next_of(events, "robot"))["waiting"]:
+                pass
+    assert (answer.status_code, "Nothing waits" in answer.text) == (409, True)
 
 
 async def test_a_refused_command_no_longer_waits(tmp_path: Path) -> None:

@@ -234,6 +234,8 @@ async def _serve(options: ServeOptions) -> None:
         servers = {
             name: _build_server(session, options, notes[name]) for name, session in sessions.items()
         }
+        for name, feed in page.feeds.items():
+            feed.book = servers[name].book
         server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
         # What was loaded stays for good: no later collection has to go through it, which would
         # hold up a stop by a tenth of a second.

@@ -18,9 +18,8 @@ from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
-    from mapspeak.server.view.desk import ViewDesk, ViewRequest
     from mapspeak.server.view.feed import ViewFeed
-    from mapspeak.server.view.keys import PageKeys
+    from mapspeak.server.view.keys import PageKeys, ViewDesk, ViewRequest
     from mapspeak.server.wire.calllog import CallLog
     from mapspeak.session import Session
 
@@ -62,7 +61,7 @@ class LivePage:
         Raises:
             ConfigError: It cannot be served where it was wanted.
         """
-        from mapspeak.server.view.serving import serve_view  # noqa: PLC0415 - only for the page
+        from mapspeak.server.view.site import serve_view  # noqa: PLC0415 - only for the page
 
         is_wanted = anyio.Event()
         async with anyio.create_task_group() as tasks:
@@ -133,9 +132,8 @@ def make_page(
         tells_token: The terminal is a person's own, and no client's log.
     """
     from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.server.view.desk import ViewDesk  # noqa: PLC0415
     from mapspeak.server.view.feed import ViewFeed  # noqa: PLC0415
-    from mapspeak.server.view.keys import PageKeys  # noqa: PLC0415
+    from mapspeak.server.view.keys import PageKeys, ViewDesk  # noqa: PLC0415
 
     def tell_token(token: str) -> None:
         if address is not None and tells_token:
@@ -234,7 +232,7 @@ def _ask_servers(control: Path, wait_s: float, *, with_key: bool) -> dict[str, s
     Raises:
         MapspeakError: None has answered.
     """
-    from mapspeak.server.view.desk import ViewRequest  # noqa: PLC0415 - heavy
+    from mapspeak.server.view.keys import ViewRequest  # noqa: PLC0415 - heavy
 
     try:
         request = ViewRequest.leave(control, getpass.getuser())

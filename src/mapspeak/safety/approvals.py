@@ -253,6 +253,11 @@ class Approvals:
         )
         return wish_id
 
+    def fresh_room(self) -> WaitingRoom:
+        """Return the waiting room, without those of this server's commands that have run out."""
+        self._forget_old()
+        return self.room
+
     def queue(self, wish_id: str) -> None:
         """Let a wish wait for `mapspeak approve`."""
         wish = self._wishes[wish_id]

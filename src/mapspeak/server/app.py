@@ -64,6 +64,7 @@ class MapspeakServer(MCPServer[Any]):
         call_log: Where every call is noted; None for nowhere.
 
     Attributes:
+        book: Of all its skills.
         skills: The tools that come and go.
         hearers: The clients to notify of these changes.
         exposure: Looks for those that the robot offers; None without patterns.
@@ -73,6 +74,7 @@ class MapspeakServer(MCPServer[Any]):
         self,
         session: Session,
         runs: SkillRuns,
+        book: SkillBook,
         *,
         instructions: str,
         call_log: CallNoting | None = None,
@@ -86,6 +88,7 @@ class MapspeakServer(MCPServer[Any]):
             extensions=[make_apps()],
         )
         self.add_tool(ChatView(session).view_map, name=VIEW_MAP, structured_output=False)
+        self.book = book
         self._session = session
         self._call_log = call_log
         self._arguments: dict[str, frozenset[str]] = {}
@@ -338,7 +341,7 @@ def build_server(
     with offering({tool.name for tool in chosen}):
         moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
         instructions = write_instructions(moves=moves)
-        server = MapspeakServer(session, runs, instructions=instructions, call_log=call_log)
+        server = MapspeakServer(session, runs, book, instructions=instructions, call_log=call_log)
         server.skills.is_read_only = is_read_only
         for tool in chosen:
             server.offer(tool)

@@ -3,6 +3,7 @@
 import base64
 import itertools
 import json
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from typing import Any
@@ -33,14 +34,19 @@ class CallFeed:
         self._log = log
         self._numbers = itertools.count(1)
         self._calls: dict[int, CallView] = {}
+        self._begun_s: dict[int, float] = {}
         self._n_characters: dict[int, int] = {}
         self._pictures: dict[int, list[ImageContent]] = {}
         self.tell: Callable[[CallView], None] = lambda _: None
 
     @property
     def calls(self) -> tuple[CallView, ...]:
-        """The latest calls, the oldest first."""
-        return tuple(self._calls.values())
+        """The latest calls, the oldest first, with their present ages."""
+        return tuple(map(self._date, self._calls.values()))
+
+    def _date(self, call: CallView) -> CallView:
+        age_s = round(time.monotonic() - self._begun_s[call.number], 1)
+        return call.model_copy(update={"age_s": age_s})
 
     def find_picture(self, number: int, index: int) -> tuple[bytes, str] | None:
         """Return a picture of a call and its media type; None where it is no longer kept."""
@@ -55,6 +61,7 @@ class CallFeed:
         number = next(self._numbers)
         shown = {_cut(name, MOST_OF_ARGUMENT): _shorten(value) for name, value in arguments.items()}
         begun = CallView(number=number, tool=tool, arguments=shown, is_over=False)
+        self._begun_s[number] = time.monotonic()
         self._keep(begun)
         own = nullcontext(CallNote(error="It came to no answer."))
         with self._log.noting(tool, arguments) if self._log else own as note:
@@ -64,9 +71,9 @@ class CallFeed:
                 self._keep(self._end(begun, note))
 
     def _end(self, begun: CallView, note: CallNote) -> CallView:
-        answer = note.answer
+        answer, took_s = note.answer, round(time.monotonic() - self._begun_s[begun.number], 1)
         if answer is None:
-            ended = {"is_over": True, "is_error": True, "text": _cut(note.error)}
+            ended = {"is_over": True, "is_error": True, "text": _cut(note.error), "took_s": took_s}
             return begun.model_copy(update=ended)
         pictures = [part for part in answer.content if isinstance(part, ImageContent)]
         texts = [part.text for part in answer.content if isinstance(part, TextContent)]
@@ -78,6 +85,7 @@ class CallFeed:
             update={
                 "is_over": True,
                 "is_error": bool(answer.is_error),
+                "took_s": took_s,
                 "text": _cut("\n".join(texts)),
                 "pictures": tuple(
                     f"calls/{begun.number}/{index}" for index in range(len(pictures))
@@ -92,9 +100,9 @@ class CallFeed:
             len(self._calls) > 1 and sum(self._n_characters.values()) > MOST_KEPT
         ):
             oldest = next(iter(self._calls))
-            del self._calls[oldest], self._n_characters[oldest]
+            del self._calls[oldest], self._n_characters[oldest], self._begun_s[oldest]
             self._pictures.pop(oldest, None)
-        self.tell(call)
+        self.tell(self._date(call))
 
 
 def _cut(text: str, most: int = MOST_CHARACTERS) -> str:

@@ -152,12 +152,12 @@ class PersonCommands:
         return "Released." if was_held else "Nothing was held."
 
     async def _approve(self, waiting: WaitingId) -> str:
-        what = self._require_guard().approvals.room.approve(waiting.id)
+        what = self._require_guard().approvals.fresh_room().approve(waiting.id)
         self._note("approval", f"approved {waiting.id}: {what}")
         return f"Approved: {what}."
 
     async def _refuse(self, waiting: WaitingId) -> str:
-        what = self._require_guard().approvals.room.refuse(waiting.id)
+        what = self._require_guard().approvals.fresh_room().refuse(waiting.id)
         self._note("approval", f"refused {waiting.id}: {what}")
         return f"Refused: {what}."
 

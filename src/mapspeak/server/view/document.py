@@ -5,15 +5,20 @@ Points are metres in the map frame, angles degrees counter-clockwise from x.
 """
 
 import base64
+import hashlib
 from collections.abc import Collection, Mapping
 from typing import Any
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from mapspeak.geometry import Pose
-from mapspeak.server.view.tiles import TILE_CELLS, draw_tile, name_tiles
 from mapspeak.spatial import OccupancyGrid
 
+TILE_CELLS = 256
+UNKNOWN_GREY = 127
 Spot = tuple[float, float]
 
 
@@ -106,13 +111,30 @@ class RobotView(ViewPart):
     camera_fov_deg: float | None = None
 
 
+class MissionsView(ViewPart):
+    """The latest mission and the saved ones, each as a tree.
+
+    Attributes:
+        states: Of the latest mission's leaves that have begun, by their numbers.
+        questions: Those that wait for an answer, in words.
+    """
+
+    latest: Mapping[str, Any] | None = None
+    is_over: bool = True
+    states: Mapping[int, str] = {}
+    questions: tuple[str, ...] = ()
+    saved: tuple[Mapping[str, Any], ...] = ()
+
+
 class CallView(ViewPart):
     """A call of a tool and its answer; in a replay also what else was said.
 
     Attributes:
         is_over: True once it has been answered.
         pictures: Addresses of those that came with it, relative to the page or the robot.
-        note: Who and when, where that is known.
+        age_s: Time since it began, when it is told; None in a replay.
+        took_s: Time until its answer.
+        note: Who and when, in a replay.
     """
 
     number: int
@@ -122,4 +144,47 @@ class CallView(ViewPart):
     is_error: bool = False
     text: str = ""
     pictures: tuple[str, ...] = ()
+    age_s: float | None = None
+    took_s: float | None = None
     note: str = ""
+
+
+# --- the map as square pictures, of which a page fetches anew only those that have changed ---
+
+
+def name_tiles(grid: OccupancyGrid) -> list[list[str]]:
+    """Return a name for what each tile shows, row by row from the grid's origin; "" for nothing."""
+    return [
+        [_name(_cut(grid, row, col)) for col in range(_count(grid.n_cols))]
+        for row in range(_count(grid.n_rows))
+    ]
+
+
+def draw_tile(grid: OccupancyGrid, row: int, col: int) -> bytes:
+    """Return a tile as PNG, a pixel a cell, the row farthest from the origin on top.
+
+    Grey 255 is free, 0 occupied, the unknown transparent: the page gives it its own colour.
+    """
+    cells = _cut(grid, row, col)[::-1]
+    known = cells >= 0
+    grey = np.where(known, np.round(255 - 2.55 * np.clip(cells, 0, 100)), UNKNOWN_GREY)
+    drawn = np.dstack([grey, grey, grey, np.where(known, 255, 0)]).astype(np.uint8)
+    return bytes(cv2.imencode(".png", drawn)[1])
+
+
+def _count(n_cells: int) -> int:
+    return -(-n_cells // TILE_CELLS)
+
+
+def _cut(grid: OccupancyGrid, row: int, col: int) -> NDArray[np.int8]:
+    rows = slice(row * TILE_CELLS, (row + 1) * TILE_CELLS)
+    cols = slice(col * TILE_CELLS, (col + 1) * TILE_CELLS)
+    return grid.cells[rows, cols]
+
+
+def _name(cells: NDArray[np.int8]) -> str:
+    if (cells < 0).all():
+        return ""
+    content = hashlib.blake2b(np.ascontiguousarray(cells).data, digest_size=8)
+    content.update(repr(cells.shape).encode())
+    return content.hexdigest()

@@ -11,8 +11,11 @@ import anyio
 from anyio.streams.memory import MemoryObjectReceiveStream, MemoryObjectSendStream
 
 from mapspeak.errors import MapspeakError
+from mapspeak.robot import CameraPicture
+from mapspeak.server.text.missions import draw_plan, say_question
+from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.view.calls import CallFeed
-from mapspeak.server.view.document import CallView, GridView, PoseView, RobotView
+from mapspeak.server.view.document import CallView, GridView, MissionsView, PoseView, RobotView
 from mapspeak.server.view.overlay import Overlay
 from mapspeak.server.view.robotlook import RobotLook
 from mapspeak.session import Session
@@ -23,6 +26,8 @@ POSE_S = 0.1
 IDLE_S = 1.0
 MAP_EVERY = 10
 """Every so many looks at the pose, look at the map and send pages a sign of life."""
+PICTURE_S = 0.5
+"""Pages that ask within that time of each other are given the same picture."""
 MOST_UNREAD = 200
 """A page that reads no more than that is let go; it comes back when it can."""
 TRAIL_M = 0.25
@@ -37,6 +42,7 @@ class ViewFeed:
     Attributes:
         robot: Looks at the robot itself.
         people: The names of those who have commanded from a page.
+        book: Of the server's missions; None until it is built.
     """
 
     def __init__(self, session: Session, calls: CallFeed) -> None:
@@ -44,6 +50,7 @@ class ViewFeed:
         self.calls = calls
         self.robot = RobotLook(session)
         self.people: set[str] = set()
+        self.book: SkillBook | None = None
         self._grids: tuple[tuple[OccupancyGrid, GridView], ...] = ()
         self._pages: set[MemoryObjectSendStream[bytes]] = set()
         self._has_page = anyio.Event()
@@ -52,7 +59,10 @@ class ViewFeed:
         self._overlay = Overlay()
         self._trail: list[tuple[float, float]] = []
         self._robot: RobotView | None = None
+        self._missions = MissionsView()
         self._has_failed = False
+        self._looking = anyio.Lock()
+        self._picture: tuple[CameraPicture, float] | None = None
         calls.tell = self._tell_call
 
     @asynccontextmanager
@@ -89,6 +99,7 @@ class ViewFeed:
             if with_map:
                 self._tell(_event("alive", None))
                 await self._look_at_map()
+                self._look_at_missions()
             await self._look_at_robot()
         except Exception:  # an error of ours in a page must not end the server of a robot
             if not self._has_failed:
@@ -107,6 +118,8 @@ class ViewFeed:
         if self._map is not None:
             events += [_event("map", self._map.model_dump())]
         events += [_event("overlay", self._overlay.model_dump()), _event("trail", self._trail)]
+        if self._missions != MissionsView():
+            events += [_event("missions", self._missions.model_dump())]
         if self._robot is not None:
             events += [_event("robot", self._robot.model_dump())]
         return events
@@ -125,6 +138,20 @@ class ViewFeed:
             if row < len(view.tiles) and col < len(view.tiles[0]) and view.tiles[row][col] == name:
                 return grid
         return None
+
+    async def see(self) -> CameraPicture:
+        """Return what the camera sees: one picture for all pages that ask at about the same time.
+
+        Raises:
+            LinkError: It gives none.
+        """
+        async with self._looking:
+            now_s = anyio.current_time()
+            if self._picture is None or now_s - self._picture[1] > PICTURE_S:
+                picture = await self.session.robot.fetch_picture()
+                self._picture = picture, now_s
+                self.robot.camera_fov_rad = picture.horizontal_fov_rad or self.robot.camera_fov_rad
+            return self._picture[0]
 
     def tell_word(self, said: str, *, page: str) -> None:
         """Tell all pages of a person's command at one of them."""
@@ -150,6 +177,12 @@ class ViewFeed:
                 self._overlay = overlay
                 self._tell(_event("overlay", overlay.model_dump()))
 
+    def _look_at_missions(self) -> None:
+        shown = MissionsView() if self.book is None else _describe_missions(self.book)
+        if shown != self._missions:
+            self._missions = shown
+            self._tell(_event("missions", shown.model_dump()))
+
     async def _look_at_robot(self) -> None:
         shown = await self.robot.look()
         if shown.pose is not None:
@@ -164,6 +197,17 @@ class ViewFeed:
         if last is None or abs(at[0] - last[0]) + abs(at[1] - last[1]) >= TRAIL_M:
             self._trail.append(at)
             del self._trail[:-MOST_TRAIL]
+
+
+def _describe_missions(book: SkillBook) -> MissionsView:
+    course = book.desk.latest
+    return MissionsView(
+        latest=None if course is None else draw_plan(course.plan),
+        is_over=course is None or course.is_over,
+        states={} if course is None else {n: str(each) for n, each in course.states.items()},
+        questions=tuple(map(say_question, book.questions.waiting)),
+        saved=tuple(draw_plan(each.plan) for each in book.saved.values()),
+    )
 
 
 def _event(kind: str, data: Any) -> bytes:  # noqa: ANN401 - JSON of any shape

@@ -39,7 +39,7 @@ class RobotLook:
             fault=fault,
             held_by=None if guard is None else guard.hold.read(),
             drive=await self._describe_drive(),
-            waiting={} if guard is None else guard.approvals.room.list_waiting(),
+            waiting={} if guard is None else guard.approvals.fresh_room().list_waiting(),
             camera_fov_deg=self._find_fov_deg(),
         )
 

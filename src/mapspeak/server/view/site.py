@@ -1,12 +1,18 @@
-"""The live page's own small web site: files, events, pictures, and a person's commands."""
+"""The live page's own small web site: files, events, pictures, and a person's commands.
+
+It is served beside the clients, on this machine alone.
+"""
 
 import json
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Generator, Mapping
+from contextlib import contextmanager
+from functools import partial
 from http import HTTPStatus
 from importlib.resources.abc import Traversable
 from typing import Any
 
 import anyio
+import uvicorn
 from pydantic import ValidationError
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -15,12 +21,20 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.server.view.commands import PersonCommands
+from mapspeak.server.view.document import draw_tile
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import NOBODY, PageKeys
 from mapspeak.server.view.pages import find_leaflet_files, find_page_files, link_page
-from mapspeak.server.view.tiles import draw_tile
+from mapspeak.server.wire.doors import (
+    HostGuard,
+    ReadyServer,
+    find_security,
+    is_loopback,
+    listen,
+    parse_address,
+)
 
 ONLY = "robot"
 """The name of an only robot in addresses."""
@@ -43,6 +57,52 @@ STOPS = frozenset({"stop", "hold"})
 FREE = STOPS | {CHECK}
 """Commands without a key: a stop must never wait, and a check moves nothing."""
 KEY, NAME_OF_PAGE = "x-mapspeak-key", "x-mapspeak-page"
+
+
+async def serve_view(
+    feeds: Mapping[str, ViewFeed],
+    address: str,
+    *,
+    keys: PageKeys,
+    on_ready: Callable[[str], None] = lambda _: None,
+) -> None:
+    """Serve the live page of some robots until cancelled.
+
+    Args:
+        feeds: Of each robot, by its name.
+        address: HOST:PORT on this machine.
+        keys: The keys that may command.
+        on_ready: Called with the page's address once it answers.
+
+    Raises:
+        ConfigError: The address is no HOST:PORT of this machine, or it is taken.
+    """
+    host, port = parse_address(address)
+    if not is_loopback(host):
+        raise ConfigError(
+            f"{host} can be reached from other machines; the live page is for this one.",
+            hint="Serve it on 127.0.0.1, and reach it from elsewhere through an SSH tunnel: "
+            f"ssh -L {port}:127.0.0.1:{port} ROBOT.",
+        )
+    site = HostGuard(build_site(feeds, keys), find_security(host, port))
+    config = uvicorn.Config(site, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
+    with listen(host, port) as listener:
+        shown = f"[{host}]" if ":" in host else host
+        page = _PageServer(config, partial(on_ready, f"http://{shown}:{port}/"))
+        async with anyio.create_task_group() as tasks:
+            for feed in feeds.values():
+                tasks.start_soon(feed.watch)
+            await page.serve(sockets=[listener])
+            tasks.cancel_scope.cancel()
+
+
+class _PageServer(ReadyServer):
+    """Leaves signals to the robot's server, which makes the robot stand first."""
+
+    @contextmanager
+    def capture_signals(self) -> Generator[None]:
+        """Capture none."""
+        yield
 
 
 def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
@@ -114,14 +174,12 @@ class LiveSite:
     async def show_camera(self, request: Request) -> Response:
         """Answer with the present camera picture."""
         feed = self._find(request)
-        robot = feed.session.robot
-        if not robot.description.has_camera:
-            raise HTTPException(HTTPStatus.NOT_FOUND, "This robot has no camera.")
         try:
-            picture = await robot.fetch_picture()
+            if not feed.session.robot.description.has_camera:
+                raise HTTPException(HTTPStatus.NOT_FOUND, "This robot has no camera.")
+            picture = await feed.see()
         except LinkError as error:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
-        feed.robot.camera_fov_rad = picture.horizontal_fov_rad or feed.robot.camera_fov_rad
         fresh = {"cache-control": "no-store"}
         return Response(picture.data, media_type=picture.media_type, headers=fresh)
 

@@ -22,7 +22,13 @@ from mapspeak.skills.comparing import plain
 from mapspeak.skills.facts import Facts, find_unmet
 from mapspeak.skills.guarded import end_within
 from mapspeak.skills.missions.record import MissionRecord
-from mapspeak.skills.missions.tree import FindSkill, MissionBounds, MissionPlan, check_plan
+from mapspeak.skills.missions.tree import (
+    FindSkill,
+    MissionBounds,
+    MissionCourse,
+    MissionPlan,
+    check_plan,
+)
 
 MOST_TOLD = 160
 """Letters of the steps that a person is asked about; the tree has them all."""
@@ -42,7 +48,7 @@ class MissionDesk:
         present: Marks a client as present: a mission needs no client while it runs.
 
     Attributes:
-        running: The name of the mission under way; empty while there is none.
+        latest: The course of the latest mission; None before the first.
     """
 
     def __init__(
@@ -61,7 +67,7 @@ class MissionDesk:
         self.guard = guard
         self.record = record
         self.present = present
-        self.running = ""
+        self.latest: MissionCourse | None = None
 
     def check(self, plan: MissionPlan) -> MissionBounds:
         """Return the bounds of a mission.
@@ -96,25 +102,26 @@ class MissionSkill:
         """
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
         if _IS_WITHIN.get():
-            return await self._go(given, on_progress)
+            return await self._go(MissionCourse(self.plan, given), on_progress)
         desk = self._desk
-        if desk.running:
+        if desk.latest is not None and not desk.latest.is_over:
             raise SkillError(
-                f"The mission {desk.running} is under way; there is one at a time.",
+                f"The mission {desk.latest.plan.spec.name} is under way; there is one at a time.",
                 hint="Wait for its end, or cancel it.",
             )
         bounds = desk.check(self.plan)
-        desk.running = self.spec.name
+        desk.latest = course = MissionCourse(self.plan, given)
         try:
             with desk.present():
-                return await self._begin(given, bounds, on_progress)
+                return await self._begin(course, bounds, on_progress)
         finally:
-            desk.running = ""
+            course.is_over = True
 
     async def _begin(
-        self, given: Mapping[str, JsonValue], bounds: MissionBounds, on_progress: OnProgress
+        self, course: MissionCourse, bounds: MissionBounds, on_progress: OnProgress
     ) -> SkillOutcome:
-        desk, scope = self._desk, self._scope(bounds, given)
+        desk, given = self._desk, course.given
+        scope = self._scope(bounds, given)
         unmet = await find_unmet(self.spec.preconditions, desk.facts)
         if unmet is not None:
             return SkillOutcome(state=SkillState.FAILED, code=SkillCode.PRECONDITION, failed=unmet)
@@ -131,7 +138,7 @@ class MissionSkill:
                 desk.record.begin(self.spec.name)
                 try:
                     outcome = await end_within(
-                        desk.facts, self.spec.timeout_s, lambda: self._go(given, on_progress)
+                        desk.facts, self.spec.timeout_s, lambda: self._go(course, on_progress)
                     )
                     said = SkillState.TIMED_OUT if outcome is None else outcome.state
                 finally:
@@ -147,13 +154,12 @@ class MissionSkill:
             numbers={"after_s": self.spec.timeout_s},
         )
 
-    async def _go(self, given: Mapping[str, JsonValue], on_progress: OnProgress) -> SkillOutcome:
+    async def _go(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
         # Loads py_trees: a server that runs no mission does without.
         from mapspeak.skills.missions.running import MissionRunner  # noqa: PLC0415
 
         runner = MissionRunner(
-            self.plan.tree,
-            given,
+            course,
             find_skill=self._desk.find_skill,
             facts=self._desk.facts,
             on_progress=on_progress,

@@ -21,7 +21,14 @@ from mapspeak.skill import (
     SkillState,
 )
 from mapspeak.skills.facts import Facts, Stopwatch
-from mapspeak.skills.missions.tree import FindSkill, Step, StepKind, fill_in, fit_kinds
+from mapspeak.skills.missions.tree import (
+    FindSkill,
+    MissionCourse,
+    Step,
+    StepKind,
+    fill_in,
+    fit_kinds,
+)
 
 MOST_TOLD = 40
 """Steps of the account that are told; the record on disk has all."""
@@ -33,8 +40,7 @@ class MissionRunner:
     """Runs one mission once.
 
     Args:
-        tree: Checked before.
-        values: The mission's arguments, by name; outputs of its steps are added.
+        course: With a tree that was checked before, and no step begun.
         find_skill: Asked when a leaf begins: a skill may have gone meanwhile.
         facts: Tell the time.
         on_progress: Told of each step.
@@ -47,8 +53,7 @@ class MissionRunner:
 
     def __init__(
         self,
-        tree: Step,
-        values: Mapping[str, JsonValue],
+        course: MissionCourse,
         *,
         find_skill: FindSkill,
         facts: Facts,
@@ -57,7 +62,7 @@ class MissionRunner:
     ) -> None:
         # py_trees prints its messages, and stdout belongs to the protocol.
         py_trees.logging.level = py_trees.logging.Level.ERROR
-        self.values: dict[str, JsonValue] = dict(values)
+        self.values: dict[str, JsonValue] = dict(course.given)
         self.facts = facts
         self.account: list[str] = []
         self._find_skill = find_skill
@@ -68,8 +73,9 @@ class MissionRunner:
         self.ending: set[_Task] = set()
         self._cut_off: SkillOutcome | None = None
         self._last: SkillOutcome | None = None
-        self._given = [step.output for step in tree.walk() if step.output]
-        self._root = self._build(tree)
+        self._course = course
+        self._given = [step.output for step in course.plan.tree.walk() if step.output]
+        self._root = self._build(course.plan.tree)
 
     async def run(self) -> SkillOutcome:
         """Run it to its end; cancelling this call cancels its running steps, too."""
@@ -109,6 +115,7 @@ class MissionRunner:
         """Run the skill of a leaf, once steps that were cut off before have ended."""
         while self.ending:
             await self._news.wait()
+        self._course.states[step.number] = SkillState.RUNNING
         try:
             skill = self._find_skill(step.skill)
             given = fill_in(step.name_arguments(skill.spec), self.values)
@@ -116,6 +123,7 @@ class MissionRunner:
             self._tell(now=f"{step.number} {step.skill}")
             outcome = await skill.run(given, partial(self._take_progress, step))
         except anyio.get_cancelled_exc_class():
+            self._course.states[step.number] = SkillState.CANCELLED
             self._note(f"{step.number} {step.skill}: cut off")
             raise
         except MapspeakError as error:
@@ -126,6 +134,7 @@ class MissionRunner:
         return outcome
 
     def _take_outcome(self, step: Step, outcome: SkillOutcome) -> None:
+        self._course.states[step.number] = outcome.state
         if step.output:
             self.values[step.output] = {**outcome.outputs, "ended": str(outcome.state)}
         if outcome.state is not SkillState.SUCCEEDED:

@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from mapspeak.errors import SkillError
-from mapspeak.skill import JsonValue, Skill, SkillApproval, SkillEffect, SkillParameter, SkillSpec
+from mapspeak.skill import (
+    JsonValue,
+    Skill,
+    SkillApproval,
+    SkillEffect,
+    SkillParameter,
+    SkillSpec,
+    SkillState,
+)
 from mapspeak.skills.arguments import check_arguments
 from mapspeak.skills.comparing import plain
 
@@ -114,6 +122,20 @@ class MissionPlan:
     spec: SkillSpec
     tree: Step
     remember: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class MissionCourse:
+    """The course of one mission.
+
+    Attributes:
+        states: Of the leaves that have begun, by their numbers.
+    """
+
+    plan: MissionPlan
+    given: Mapping[str, JsonValue]
+    states: dict[int, SkillState] = field(default_factory=dict)
+    is_over: bool = False
 
 
 FindSkill = Callable[[str], Skill]

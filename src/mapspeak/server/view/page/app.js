@@ -132,7 +132,7 @@ class ChatMap {
     const [offered, button] = [document.createElement("div"), document.createElement("button")];
     button.textContent = `Go to ${where}`;
     button.addEventListener("click", () => { this.map.closeBubble(); this.say(`Go to ${where}.`); });
-    offered.append(plain(isPlace ? `${item.id} ${item.name ?? ""}` : where), button);
+    offered.append(plain(isPlace ? item.said : where), button);
     this.map.ask(at, offered);
   }
 

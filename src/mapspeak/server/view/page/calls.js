@@ -6,7 +6,7 @@ const MOST_CALLS = 100;
 
 /**
  * @typedef {{number: number, tool: string, arguments: object, is_over: boolean, is_error: boolean,
- *   text: string, pictures: string[], note?: string}} Call
+ *   text: string, pictures: string[], note?: string, age_s?: number | null, took_s?: number | null}} Call
  */
 
 class Calls {
@@ -53,6 +53,11 @@ class Calls {
     }
   }
 
+  /** Let the times since each call go on. */
+  showAges() {
+    for (const note of this.list.querySelectorAll(".age")) showAge(/** @type {HTMLElement} */ (note));
+  }
+
   /** @param {Call} call */
   summary(call) {
     const summary = document.createElement("summary");
@@ -62,6 +67,12 @@ class Calls {
     const state = call.is_over ? (call.is_error ? " failed" : "") : " …";
     const note = document.createElement("small");
     note.textContent = legible(call.note ?? "");
+    if (call.age_s != null) {
+      note.className = "age";
+      note.dataset.begun = String(performance.now() - 1000 * call.age_s);
+      note.dataset.took = call.took_s == null ? "" : `, took ${call.took_s} s`;
+      showAge(note);
+    }
     summary.append(legible(`${call.number} ${call.tool} `), told, state, " ", note);
     return summary;
   }
@@ -76,6 +87,11 @@ class Calls {
       showPicture(this.address(name), `Picture ${index + 1} of ${n_pictures} of ${call.number} ${call.tool}`));
     return call.text ? [text, ...pictures] : pictures;
   }
+}
+
+/** @param {HTMLElement} note */
+function showAge(note) {
+  note.textContent = ago((performance.now() - Number(note.dataset.begun)) / 1000) + note.dataset.took;
 }
 
 /** Return a picture that leads to itself in full size. @param {string} address @param {string} alt */

@@ -3,6 +3,7 @@
 "use strict";
 
 const KEPT = "mapspeak-key";
+const SAID_S = 20;
 const FREE = ["stop", "stop-all", "hold", "check"];
 
 class Commands {
@@ -13,6 +14,7 @@ class Commands {
   constructor(base, { robot, isFleet }) {
     this.base = base;
     this.waiting = "";
+    this.fading = 0;
     this.page = Math.random().toString(36).slice(2);
     // A key that `mapspeak view` gave stands behind the #, which no server is sent.
     const given = new URLSearchParams(location.hash.slice(1)).get("key");
@@ -93,6 +95,9 @@ class Commands {
     const said = byId("said");
     said.textContent = legible(text);
     said.hidden = false;
+    window.clearTimeout(this.fading);
+    // What went wrong stays until something else is said.
+    if (!/NOT |not /.test(text)) this.fading = window.setTimeout(() => { said.hidden = true; }, 1000 * SAID_S);
   }
 
   /** @param {Record<string, string>} waiting what waits for a person's word, by its id */
@@ -119,10 +124,11 @@ class Commands {
     const offered = document.createElement("div");
     const target = { x, y };
     const id = item?.id ?? "";
-    offered.append(plain(id ? `${id} ${item?.name ?? ""}` : `x ${x}, y ${y}`));
+    offered.append(plain(item?.said ?? `x ${x}, y ${y}`), plain("Locked: type your token above to command."));
+    offered.children[1].className = "locked-note";
     offered.append(this.button("Check this goal", "check", target), this.button("Drive here", "drive", target));
     if (item?.kind === "room" || item?.kind === "door") {
-      offered.append(this.form(`Close ${id} until`, "close", (until) => ({ place: id, until }), "14:00, in 2h; or empty"));
+      offered.append(this.form(`Close ${id} until`, "close", (until) => ({ place: id, until }), "14:00 or in 2h"));
     }
     if (item?.kind === "closed" && id) offered.append(this.button(`End ${id}`, "end", { event: id }));
     if (item?.kind === "place") {

@@ -28,6 +28,7 @@ async function showLive() {
   let latest = null;
   let heardAt = 0;
   let isConnected = false;
+  let mapAt = 0;
 
   const events = new EventSource(`${base}/events`);
   const on = (/** @type {string} */ kind, /** @type {(data: any) => void} */ act) =>
@@ -37,11 +38,12 @@ async function showLive() {
     });
   events.onopen = () => { isConnected = true; showState(); };
   events.onerror = () => { isConnected = false; showState(); };
-  on("map", (data) => map.showMap(data));
+  on("map", (data) => { mapAt = performance.now(); map.showMap(data); });
   on("overlay", (data) => map.showOverlay(data));
   on("trail", (data) => map.showTrail(data));
   on("calls", (data) => calls.showAll(data));
   on("call", (data) => calls.show(data));
+  on("missions", (data) => showMissions(byId("missions"), data));
   on("word", (data) => commands.hear(data));
   on("alive", () => {});
   on("robot", (data) => {
@@ -58,30 +60,85 @@ async function showLive() {
     if (isLost) said.push("The server does not answer; trying again.");
     if (latest) {
       const { pose, drive } = latest;
+      document.body.classList.toggle("held", Boolean(latest.held_by));
       if (latest.held_by) said.push(`HELD ${latest.held_by}.`);
       if (latest.fault) said.push(latest.fault);
       if (pose) said.push(`x ${pose.x.toFixed(2)}, y ${pose.y.toFixed(2)}, ${pose.yaw_deg.toFixed(0)}°.`);
       if (latest.doubt) said.push(latest.doubt);
       if (drive) said.push(`${drive.id} to ${drive.place}: ${drive.state}. ${drive.reason}`);
-      const age_s = latest.age_s + silent_s;
-      if (age_s > OLD_S) said.push(`The pose is ${age_s.toFixed(0)} s old.`);
+      const age_s = latest.age_s + (isLost ? silent_s : 0);
+      said.push(`Pose ${ago(age_s)}, map changed ${mapAt ? ago((performance.now() - mapAt) / 1000) : "never"}.`);
       byId("state").classList.toggle("old", isLost || age_s > OLD_S || Boolean(latest.doubt));
     }
     byId("state").textContent = legible(said.join(" ")) || "Waiting for the robot.";
   }
-  setInterval(showState, 1000);
+  setInterval(() => { showState(); calls.showAges(); }, 1000);
 
+  watchCamera(base, () => isConnected);
+}
+
+/** Show the camera: the next picture is asked for when the one before has come.
+ * @param {string} base @param {() => boolean} isConnected */
+function watchCamera(base, isConnected) {
   const camera = new Image();
   camera.id = "camera";
+  camera.hidden = true;
   camera.alt = "What the robot's camera sees now";
-  camera.addEventListener("error", () => { camera.alt = "No picture from the robot's camera."; });
   byId("picture").append(camera);
-  function lookAhead() {
-    if (byId("watching").checked && document.visibilityState === "visible" && isConnected) {
-      camera.src = `${base}/camera?at=${Date.now()}`;
+  let seenAt = 0;
+  let isWaiting = false;
+  async function look() {
+    if (!isWaiting && byId("watching").checked && document.visibilityState === "visible" && isConnected()) {
+      isWaiting = true;
+      const next = new Image();
+      next.src = `${base}/camera?at=${Date.now()}`;
+      try {
+        await next.decode();
+        camera.src = next.src;
+        camera.hidden = false;
+        seenAt = performance.now();
+      } catch { /* the age below tells */ }
+      isWaiting = false;
     }
+    const age_s = (performance.now() - seenAt) / 1000;
+    byId("seen").textContent = seenAt ? (age_s > OLD_S ? ` Picture ${ago(age_s)}.` : "") : " No picture from the robot's camera.";
+    byId("picture").classList.toggle("old", age_s > OLD_S);
   }
-  setInterval(lookAhead, 1000);
+  look();
+  setInterval(look, 1000);
+}
+
+const SIGNS = { running: "▶", succeeded: "✓", failed: "✗", cancelled: "■", timed_out: "✗" };
+
+/** Draw the latest mission with the state of each leaf, and the saved ones.
+ * @param {HTMLElement} list @param {any} told */
+function showMissions(list, { latest, is_over: isOver, states, questions, saved }) {
+  const tree = (/** @type {any} */ step, /** @type {Record<string, string>} */ known) => {
+    const row = document.createElement("li");
+    const state = known[step.number];
+    row.className = state ?? "";
+    row.append(plain(`${SIGNS[/** @type {keyof typeof SIGNS} */ (state)] ?? "·"} ${step.said}`));
+    if (state) row.append(` ${state.replace("_", " ")}`);
+    if (step.steps.length) {
+      const inner = document.createElement("ul");
+      inner.append(...step.steps.map((/** @type {any} */ each) => tree(each, known)));
+      row.append(inner);
+    }
+    return row;
+  };
+  const part = (/** @type {any} */ plan, /** @type {string} */ title, /** @type {boolean} */ isOpen, known = {}) => {
+    const [details, summary, steps] = ["details", "summary", "ul"].map((name) => document.createElement(name));
+    /** @type {HTMLDetailsElement} */ (details).open = isOpen;
+    summary.append(plain(title));
+    steps.append(tree(plan.tree, known));
+    details.append(summary, ...plan.remember.map((/** @type {string} */ said) => plain(`Remember: ${said}`)), steps);
+    return details;
+  };
+  const asked = questions.map((/** @type {string} */ said) => plain(`Asks ${said}`));
+  const running = latest ? [part(latest, `${isOver ? "Last mission" : "Mission under way"}: ${latest.name}`, true, states)] : [];
+  list.replaceChildren(...asked, ...running,
+    ...saved.map((/** @type {any} */ plan) => part(plan, `Saved mission: ${plan.name}`, false)));
+  list.hidden = !list.childElementCount;
 }
 
 showLive();

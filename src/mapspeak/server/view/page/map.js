@@ -7,12 +7,15 @@
 /**
  * What was clicked: a point of the map, and what lies there.
  * @typedef {{x: number, y: number, at: {lat: number, lng: number}, item: Item | null}} Click
- * @typedef {{kind: string, id: string, name?: string}} Item
+ * @typedef {{kind: string, id: string, name?: string, said?: string}} Item
  */
 
 const COLOURS = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#cc79a7", "#d55e00"];
 const CONE_M = 3;
 const NAMES_FROM_PX_PER_M = 12;
+/** From here on doors, frontiers, places and things have their names beside them. */
+const ALL_NAMES_FROM_PX_PER_M = 45;
+const MARKS = { rooms: "▰", closed: "▰", doors: "●", frontiers: "○", things: "●", places: "●", trail: "—", path: "┅" };
 const TRAIL_M = 0.25;
 const MOST_TRAIL = 4000;
 
@@ -28,6 +31,12 @@ const INVISIBLE = /[\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u2
 function legible(text) {
   return text.replace(INVISIBLE, (found) =>
     `<U+${found.charCodeAt(0).toString(16).toUpperCase().padStart(4, "0")}>`);
+}
+
+/** Say how long ago something was. @param {number} age_s */
+function ago(age_s) {
+  if (age_s < 90) return `${Math.max(0, age_s).toFixed(0)} s ago`;
+  return age_s < 5400 ? `${(age_s / 60).toFixed(0)} min ago` : `${(age_s / 3600).toFixed(0)} h ago`;
 }
 
 /** Return an element with text in it, which is never read as HTML. @param {string} text */
@@ -61,9 +70,14 @@ class MapView {
     const layer = () => L.layerGroup().addTo(this.map);
     this.layers = { rooms: layer(), closed: layer(), doors: layer(), frontiers: layer(),
       things: layer(), places: layer(), trail: layer(), path: layer(), robot: layer() };
-    const { robot: _, ...chosen } = this.layers;
-    L.control.layers(null, chosen).addTo(this.map);
-    this.isPlaced = false;
+    const named = Object.entries(MARKS).map(([name, mark]) =>
+      [`<span class="mark ${name}">${mark}</span> ${name}`, this.layers[/** @type {keyof typeof MARKS} */ (name)]]);
+    L.control.layers(null, Object.fromEntries(named)).addTo(this.map);
+    this.addWholeButton();
+    // The view grows with the map until a person moves it.
+    this.isFollowing = true;
+    this.isFitting = false;
+    this.map.on("movestart zoomstart", () => { this.isFollowing &&= this.isFitting; });
     /** @type {number[][]} */
     this.track = [];
     this.trail = L.polyline([], { color: "#888", weight: 2 }).addTo(this.layers.trail);
@@ -71,8 +85,30 @@ class MapView {
     this.goal = L.circleMarker([0, 0], { radius: 9, color: "#0072b2", weight: 3, fill: false, interactive: false });
     this.cone = L.polygon([], { color: "#d55e00", weight: 1, fillOpacity: 0.12 }).addTo(this.layers.robot);
     this.marker = this.makeRobot();
+    this.map.on("resize", () => { if (this.isFollowing) this.showWhole(); });
     this.map.on("click", (/** @type {any} */ event) => this.click(event.latlng, null));
     this.map.on("zoomend", () => this.showNames());
+  }
+
+  addWholeButton() {
+    const button = document.createElement("button");
+    button.title = "Show the whole map, and follow it as it grows";
+    button.setAttribute("aria-label", button.title);
+    button.className = "leaflet-bar whole";
+    button.textContent = "\u2922";
+    L.DomEvent.disableClickPropagation(button);
+    button.addEventListener("click", () => { this.isFollowing = true; this.showWhole(); });
+    const control = new L.Control({ position: "topleft" });
+    control.onAdd = () => button;
+    control.addTo(this.map);
+  }
+
+  /** Fit the view to the tiles. */
+  showWhole() {
+    if (!this.tiles.size) return;
+    this.isFitting = true;
+    this.map.fitBounds(L.featureGroup([...this.tiles.values()]).getBounds(), { animate: false });
+    this.isFitting = false;
   }
 
   makeRobot() {
@@ -123,11 +159,9 @@ class MapView {
       // A tile goes when what takes its place has come: nothing flickers.
       if (!fresh.has(key)) setTimeout(() => tile.remove(), 300);
     }
+    const isOther = [...fresh.keys()].some((key) => !this.tiles.has(key));
     this.tiles = fresh;
-    if (!this.isPlaced && fresh.size) {
-      this.isPlaced = true;
-      this.map.fitBounds(L.featureGroup([...fresh.values()]).getBounds());
-    }
+    if (isOther && this.isFollowing) this.showWhole();
   }
 
   /** @param {any} overlay */
@@ -142,17 +176,17 @@ class MapView {
         dashArray: region.kind === "corridor" ? "6 4" : undefined });
       this.put(shape, rooms, `${region.kind.replace("_", " ")}, ${region.floor_m2} m²`,
         { kind: "room", id: region.id }, region.middle);
-      this.name(region.id, region.middle, rooms);
+      this.name(region.id, region.middle, rooms, "name");
     });
     overlay.doors.forEach((/** @type {any} */ door) =>
       this.put(L.circleMarker(this.place(door.at), { radius: 4, color: "#e69f00", fillOpacity: 0.9 }), doors,
-        `${door.joins.join(", ")}; ${door.width_m} m wide`, { kind: "door", id: door.id }, door.at));
+        `door of ${door.joins.join(" and ")}, ${door.width_m} m wide`, { kind: "door", id: door.id }, door.at));
     overlay.frontiers.forEach((/** @type {any} */ frontier) => {
       frontier.border.forEach((/** @type {number[]} */ at) =>
         L.circleMarker(this.place(at), { radius: 1.5, stroke: false, fillColor: "#d55e00", fillOpacity: 0.8,
           interactive: false }).addTo(frontiers));
       this.put(L.circleMarker(this.place(frontier.at), { radius: 5, color: "#d55e00" }), frontiers,
-        `about ${frontier.promised_m2} m² to see`, { kind: "frontier", id: frontier.id }, frontier.at);
+        `frontier, about ${frontier.promised_m2} m² to see`, { kind: "frontier", id: frontier.id }, frontier.at);
     });
     overlay.closed.forEach((/** @type {any} */ area) =>
       this.put(L.polygon(area.outlines.map((/** @type {number[][]} */ each) => each.map((at) => this.place(at))),
@@ -187,23 +221,29 @@ class MapView {
    * @param {number[]} at */
   put(shape, layer, told, item, at) {
     const said = item.id && item.kind !== "closed" ? `${item.id}: ${told}` : told;
+    item.said = said;
     this.listed.push({ said, item, at });
     shape.bindTooltip(plain(said), { sticky: true }).addTo(layer);
+    if (["door", "frontier"].includes(item.kind)) this.name(item.id, at, layer, "name near");
+    if (["place", "thing"].includes(item.kind)) this.name(item.name ?? "", at, layer, "name near");
     shape.on("click", (/** @type {any} */ event) => {
       L.DomEvent.stopPropagation(event);
       this.click(event.latlng, item);
     });
   }
 
-  /** @param {string} text @param {number[]} at @param {any} layer */
-  name(text, at, layer) {
-    L.tooltip({ permanent: true, direction: "center", className: "name", interactive: false })
+  /** @param {string} text @param {number[]} at @param {any} layer @param {string} className */
+  name(text, at, layer, className) {
+    const isBeside = className !== "name";
+    L.tooltip({ permanent: true, direction: isBeside ? "right" : "center", offset: isBeside ? [4, 0] : [0, 0],
+      className, interactive: false })
       .setLatLng(this.place(at)).setContent(plain(text)).addTo(layer);
   }
 
   showNames() {
-    const isNear = 2 ** this.map.getZoom() >= NAMES_FROM_PX_PER_M;
-    this.map.getPane("tooltipPane").style.display = isNear ? "" : "none";
+    const scale = 2 ** this.map.getZoom();
+    this.map.getPane("tooltipPane").style.display = scale >= NAMES_FROM_PX_PER_M ? "" : "none";
+    this.map.getContainer().classList.toggle("far", scale < ALL_NAMES_FROM_PX_PER_M);
   }
 
   /** @param {number[][]} trail */
@@ -249,7 +289,8 @@ class MapView {
   /** Open a bubble. @param {{lat: number, lng: number}} at @param {HTMLElement} content */
   ask(at, content) {
     content.classList.add("at");
-    L.popup({ minWidth: 180 }).setLatLng(at).setContent(content).openOn(this.map);
+    const width = Math.min(300, this.map.getSize().x - 130);
+    L.popup({ minWidth: 180, maxWidth: width, autoPanPaddingTopLeft: [50, 10], autoPanPaddingBottomRight: [60, 10] }).setLatLng(at).setContent(content).openOn(this.map);
   }
 
   /** Show a part of the map frame. @param {number[][]} points */
