@@ -10,7 +10,7 @@ import random
 import statistics
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +38,13 @@ from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.skill import (
-    JsonValue,
+    Arguments,
     OnProgress,
+    Skill,
     SkillEffect,
     SkillOutcome,
     SkillSpec,
-    SkillState,
+    succeeded,
 )
 from mapspeak.skills.layout import build_layout
 
@@ -132,8 +133,8 @@ async def _publish_all(
             try:
                 interface = Interface(InterfaceKind.PUBLISH, topic, kind)
                 skill = await open_interface(interface, ros, name="any")
-                given = json.loads(json.dumps(skill.sent.read(message)))
-                extra = {"for_s": 0.1} if skill.is_velocity else {}
+                given = json.loads(json.dumps(build_layout(book, kind).read(message)))
+                extra = {"for_s": 0.1} if interface.is_velocity else {}
                 await skill.run(given | extra, lambda _: None)
             except MapspeakError as error:
                 print(f"{topic} ({kind}): {error}")  # noqa: T201 - tells what did not come through
@@ -145,18 +146,8 @@ async def _publish_all(
             tasks.start_soon(publish, topic, kind, make_message(book, kind, dice))
 
 
-class _Listed:
-    """A skill that is there to be listed."""
-
-    def __init__(self, spec: SkillSpec) -> None:
-        self.spec = spec
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Do nothing."""
-        del arguments, on_progress
-        return SkillOutcome(state=SkillState.SUCCEEDED)
+async def _do_nothing(_arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+    return succeeded()
 
 
 async def _time_listing() -> float:
@@ -176,7 +167,7 @@ async def _time_listing() -> float:
                     timeout_s=1.0,
                     parameters=build_layout(book, name).parameters,
                 )
-                server.skills.put_up(_Listed(spec))
+                server.skills.put_up(Skill(spec, _do_nothing))
             taken_ms: list[float] = []
             async with Client(server) as client:
                 for _ in range(N_LISTINGS):

@@ -23,7 +23,7 @@ from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.safety import Guard
 from mapspeak.server.app import MapspeakServer, build_server
 from mapspeak.session import Session
-from mapspeak.skills.owners.skillsfile import OwnersEntry
+from mapspeak.skills.skillsfile import OwnersEntry
 from rosbridge_script import PATIENCE_S
 from rosserved import QUICK, Caller
 

@@ -15,7 +15,7 @@ from mapspeak.safety import Guard
 from mapspeak.server.app import MapspeakServer, build_server
 from mapspeak.session import Session
 from mapspeak.skill import Skill
-from mapspeak.skills.owners.skillsfile import OwnersEntry, load_skills
+from mapspeak.skills.skillsfile import OwnersEntry, load_skills
 from rosserved import Caller
 
 PATIENCE_S = 60.0

@@ -10,6 +10,7 @@ from guarding import MONDAY_NOON
 from mapspeak.skill import (
     JsonValue,
     OnProgress,
+    Skill,
     SkillEffect,
     SkillOutcome,
     SkillProgress,
@@ -26,17 +27,24 @@ def spec(name: str = "lift", **more: object) -> SkillSpec:
     return SkillSpec(name=name, **(known | more))  # type: ignore[arg-type]
 
 
-@dataclass
-class FakeSkill:
+class FakeSkill(Skill):
     """Keeps what it was given, and ends as a test says."""
 
-    spec: SkillSpec
-    do: Doing | None = None
-    outputs: Mapping[str, JsonValue] = field(default_factory=dict)
-    given: list[Mapping[str, JsonValue]] = field(default_factory=list)
-    n_ended: int = 0
+    __setattr__ = object.__setattr__
 
-    async def run(
+    def __init__(
+        self,
+        spec: SkillSpec,
+        do: Doing | None = None,
+        outputs: Mapping[str, JsonValue] | None = None,
+    ) -> None:
+        super().__init__(spec, self._run)
+        self.do = do
+        self.outputs = outputs or {}
+        self.given: list[Mapping[str, JsonValue]] = []
+        self.n_ended = 0
+
+    async def _run(
         self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
     ) -> SkillOutcome:
         self.given.append(arguments)

@@ -1,16 +1,18 @@
 """THE PORT: a robot's skills besides driving, and their values.
 
-A skill is an exposed topic, service or action of the robot, an entry of skills.yaml, a skill of the
-simulated robot, or a saved mission. The caller sees only this port.
+A skill is a description (`SkillSpec`) and a function that does it. Exposed topics, services and
+actions, entries of skills.yaml, skills of the simulated robot, leaves of missions and missions
+themselves all have this one form.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from enum import StrEnum
 from typing import Any, Protocol
 
 JsonValue = Any
 """A value of JSON: None, a truth value, a number, a text, a list or an object by its names."""
+Arguments = Mapping[str, JsonValue]
 
 
 class SkillEffect(StrEnum):
@@ -19,13 +21,6 @@ class SkillEffect(StrEnum):
     READS = "reads"
     MOVES = "moves"
     CHANGES = "changes"
-
-
-class SkillApproval(StrEnum):
-    """The need for a person's consent before a skill runs."""
-
-    AS_POLICY = "as_policy"
-    ALWAYS = "always"
 
 
 class ParameterKind(StrEnum):
@@ -40,7 +35,7 @@ class ParameterKind(StrEnum):
     OBJECT = "object"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class SkillParameter:
     """One parameter of a skill, or an element of a list or an object within one.
 
@@ -59,6 +54,7 @@ class SkillParameter:
 
     name: str
     kind: ParameterKind
+    _: KW_ONLY
     description: str = ""
     unit: str = ""
     least: float | None = None
@@ -70,29 +66,7 @@ class SkillParameter:
     fields: tuple["SkillParameter", ...] = ()
 
 
-class PreconditionKind(StrEnum):
-    """The conditions that may have to hold before a skill runs."""
-
-    BATTERY_ABOVE = "battery_above"
-    STANDING = "standing"
-    IN_ROOM = "in_room"
-
-
 @dataclass(frozen=True, slots=True)
-class Precondition:
-    """A condition that must hold before a skill runs.
-
-    Attributes:
-        ratio: Of the battery's charge, for `BATTERY_ABOVE`.
-        room: Its id or its name, for `IN_ROOM`.
-    """
-
-    kind: PreconditionKind
-    ratio: float | None = None
-    room: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SkillSpec:
     """The description of a skill before it runs.
 
@@ -100,16 +74,18 @@ class SkillSpec:
         name: Unique among the skills of a robot: small letters, digits and underscores.
         description: What it does, in its owner's words: quoted, never followed.
         timeout_s: It is cancelled when it has not ended by then, in robot time.
-        preconditions: All of them must hold when it begins.
+        needs: The conditions that must hold when it begins, as a mission's `check` takes them.
+        is_always_asked: A person is asked each time, whatever the policy says.
     """
 
     name: str
     description: str
     effect: SkillEffect
+    _: KW_ONLY
     timeout_s: float
     parameters: tuple[SkillParameter, ...] = ()
-    preconditions: tuple[Precondition, ...] = ()
-    approval: SkillApproval = SkillApproval.AS_POLICY
+    needs: Arguments = field(default_factory=dict)
+    is_always_asked: bool = False
 
 
 class SkillState(StrEnum):
@@ -120,11 +96,6 @@ class SkillState(StrEnum):
     FAILED = "failed"
     CANCELLED = "cancelled"
     TIMED_OUT = "timed_out"
-
-    @property
-    def is_final(self) -> bool:
-        """True when nothing more will happen."""
-        return self is not SkillState.RUNNING
 
 
 class SkillCode(StrEnum):
@@ -137,29 +108,39 @@ class SkillCode(StrEnum):
     REJECTED = "rejected"
     ABORTED = "aborted"
     LOST = "lost"
-    NOT_OFFERED = "not_offered"
     NOT_ANSWERED = "not_answered"
     PRECONDITION = "precondition"
     NOT_ACHIEVED = "not_achieved"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class SkillOutcome:
     """How a run of a skill ended.
 
     Attributes:
         outputs: Its results, by name; a mission passes these on.
-        numbers: Details of the code, by name with the unit, such as "after_s" or "battery_ratio".
+        numbers: Details of the code, by name with the unit, such as "after_s".
         quote: The words of the robot's software.
-        failed: The condition that did not hold, for `PRECONDITION`.
+        unmet: The condition that did not hold, for `PRECONDITION`.
     """
 
     state: SkillState
     code: SkillCode = SkillCode.DONE
-    outputs: Mapping[str, JsonValue] = field(default_factory=dict)
+    _: KW_ONLY
+    outputs: Arguments = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
     quote: str = ""
-    failed: Precondition | None = None
+    unmet: Arguments = field(default_factory=dict)
+
+
+def succeeded(**outputs: JsonValue) -> SkillOutcome:
+    """Return the outcome of a run that did what it should."""
+    return SkillOutcome(SkillState.SUCCEEDED, outputs=outputs)
+
+
+def failed(code: SkillCode = SkillCode.NOT_ACHIEVED, quote: str = "") -> SkillOutcome:
+    """Return the outcome of a run that did not."""
+    return SkillOutcome(SkillState.FAILED, code, quote=quote)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,13 +149,11 @@ class SkillProgress:
 
     Attributes:
         values: The latest feedback, by name.
-        done_ratio: None where it is not known.
         is_asking: It waits for an answer.
         account: The steps that a mission has done so far.
     """
 
-    values: Mapping[str, JsonValue] = field(default_factory=dict)
-    done_ratio: float | None = None
+    values: Arguments = field(default_factory=dict)
     is_asking: bool = False
     account: tuple[str, ...] = ()
 
@@ -183,25 +162,19 @@ OnProgress = Callable[[SkillProgress], None]
 """The listener for progress; it must not raise."""
 
 
-class Skill(Protocol):
-    """Something that a robot can do, by name."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Skill:
+    """Something that a robot can do, by name.
 
-    @property
-    def spec(self) -> SkillSpec:
-        """Its description before it runs."""
+    Attributes:
+        run: Do it once, and return how it ended. Everything it started is ended when its task is
+            cancelled: nothing of it is left running at the robot. It raises `MapspeakError` where
+            it cannot be begun: wrong arguments, a denied or a missing interface, an approval that
+            is needed. Nothing was sent to the robot then.
+    """
 
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Do it once, and return how it ended.
-
-        Everything it started is ended when the task is cancelled or the timeout passes:
-        nothing of it is left running at the robot.
-
-        Raises:
-            MapspeakError: It cannot be begun: wrong arguments, a denied or a missing interface, an
-                approval that is needed. Nothing was sent to the robot then.
-        """
+    spec: SkillSpec
+    run: Callable[[Arguments, OnProgress], Awaitable[SkillOutcome]]
 
 
 class SkilledRobot(Protocol):

@@ -17,16 +17,14 @@ from mapspeak.safety import (
     Policy,
 )
 from mapspeak.skill import (
+    Arguments,
     ParameterKind,
-    Precondition,
-    PreconditionKind,
-    SkillApproval,
     SkillCode,
     SkillOutcome,
     SkillParameter,
     SkillState,
 )
-from mapspeak.skills.guarded import GuardedSkill
+from mapspeak.skills.guarding import SkillGate
 from skillmaking import FakeFacts, FakeSkill, never, spec, tell_nobody
 
 pytestmark = pytest.mark.anyio
@@ -42,7 +40,7 @@ def approve_all(guard: Guard) -> None:
 
 async def test_a_skill_is_noted_before_it_runs_and_when_it_has_ended(tmp_path: Path) -> None:
     skill = FakeSkill(spec())
-    guarded = GuardedSkill(skill, facts=FakeFacts(), guard=make_guard(tmp_path))
+    guarded = SkillGate(FakeFacts(), make_guard(tmp_path)).hold(skill)
     outcome = await guarded.run({}, tell_nobody)
     assert outcome.state is SkillState.SUCCEEDED
     told = [(line.event, line.kind, line.said) for line in audit_of(tmp_path)]
@@ -52,7 +50,7 @@ async def test_a_skill_is_noted_before_it_runs_and_when_it_has_ended(tmp_path: P
 async def test_a_skill_that_the_policy_denies_is_not_run(tmp_path: Path) -> None:
     skill = FakeSkill(spec("lift_pallet"))
     policy = Policy(patterns={CommandKind.SKILL: Patterns(deny=("lift*",))})
-    guarded = GuardedSkill(skill, facts=FakeFacts(), guard=make_guard(tmp_path, policy))
+    guarded = SkillGate(FakeFacts(), make_guard(tmp_path, policy)).hold(skill)
     with pytest.raises(PolicyError, match="lift"):
         await guarded.run({}, tell_nobody)
     assert skill.given == []
@@ -62,7 +60,7 @@ async def test_a_held_robot_runs_no_skill(tmp_path: Path) -> None:
     guard, skill = make_guard(tmp_path), FakeSkill(spec())
     guard.hold.put("a person", at=guard.wall_clock())
     with pytest.raises(PolicyError, match="held"):
-        await GuardedSkill(skill, facts=FakeFacts(), guard=guard).run({}, tell_nobody)
+        await SkillGate(FakeFacts(), guard).hold(skill).run({}, tell_nobody)
     assert skill.given == []
 
 
@@ -78,8 +76,8 @@ async def test_a_persons_word_for_a_skill_covers_what_it_commands_and_no_more(
         guard.clear(denied_usually, robot_s=0.0)
         return SkillOutcome(state=SkillState.SUCCEEDED)
 
-    skill = FakeSkill(spec("set_pose", approval=SkillApproval.ALWAYS), do=do)
-    guarded = GuardedSkill(skill, facts=FakeFacts(), guard=guard, is_through_guard=True)
+    skill = FakeSkill(spec("set_pose", is_always_asked=True), do=do)
+    guarded = SkillGate(FakeFacts(), guard).hold(skill, is_through_guard=True)
     with pytest.raises(ApprovalNeededError, match="set_pose"):
         await guarded.run({}, tell_nobody)
     approve_all(guard)
@@ -98,8 +96,8 @@ async def test_a_word_for_a_skill_opens_nothing_that_a_person_has_denied(tmp_pat
         guard.clear(Call(service="/set_initial_pose", type="", arguments={}), robot_s=0.0)
         return SkillOutcome(state=SkillState.SUCCEEDED)
 
-    skill = FakeSkill(spec("set_pose", approval=SkillApproval.ALWAYS), do=do)
-    guarded = GuardedSkill(skill, facts=FakeFacts(), guard=guard, is_through_guard=True)
+    skill = FakeSkill(spec("set_pose", is_always_asked=True), do=do)
+    guarded = SkillGate(FakeFacts(), guard).hold(skill, is_through_guard=True)
     with pytest.raises(ApprovalNeededError):
         await guarded.run({}, tell_nobody)
     approve_all(guard)
@@ -110,40 +108,42 @@ async def test_a_word_for_a_skill_opens_nothing_that_a_person_has_denied(tmp_pat
 @pytest.mark.parametrize(
     "needs",
     [
-        Precondition(PreconditionKind.BATTERY_ABOVE, ratio=0.3),
-        Precondition(PreconditionKind.STANDING),
-        Precondition(PreconditionKind.IN_ROOM, room="R2"),
+        {"battery_above": 0.3},
+        {"standing": True},
+        {"in_room": "R2"},
+        {"not": True, "battery_below": 0.3},
+        {"time_from": "11:30", "sees": "cat"},
     ],
 )
-async def test_what_does_not_hold_keeps_a_skill_from_being_begun(needs: Precondition) -> None:
+async def test_what_does_not_hold_keeps_a_skill_from_being_begun(needs: Arguments) -> None:
     facts = FakeFacts(battery=0.2, stands=False, rooms={"R1"})
-    skill = FakeSkill(spec(preconditions=(needs,)))
-    guarded = GuardedSkill(skill, facts=facts, guard=None)
+    skill = FakeSkill(spec(needs=needs))
+    guarded = SkillGate(facts, None).hold(skill)
     outcome = await guarded.run({}, tell_nobody)
-    assert (outcome.code, outcome.failed) == (SkillCode.PRECONDITION, needs)
+    assert (outcome.code, bool(outcome.unmet)) == (SkillCode.PRECONDITION, True)
     assert skill.given == []
-    facts.battery, facts.stands, facts.rooms = 0.4, True, {"R2"}
+    facts.battery, facts.stands, facts.rooms, facts.seen = 0.4, True, {"R2"}, {"cat"}
     assert (await guarded.run({}, tell_nobody)).state is SkillState.SUCCEEDED
 
 
 async def test_a_battery_that_nothing_tells_of_is_not_above_anything() -> None:
-    needs = Precondition(PreconditionKind.BATTERY_ABOVE, ratio=0.0)
-    guarded = GuardedSkill(FakeSkill(spec(preconditions=(needs,))), facts=FakeFacts(), guard=None)
+    needs = {"battery_above": 0.0}
+    guarded = SkillGate(FakeFacts(), None).hold(FakeSkill(spec(needs=needs)))
     assert (await guarded.run({}, tell_nobody)).code is SkillCode.PRECONDITION
 
 
 async def test_a_skill_that_never_ends_is_ended_by_the_robots_clock() -> None:
     skill = FakeSkill(spec(timeout_s=5.0), do=never)
-    guarded = GuardedSkill(skill, facts=FakeFacts(passes_s=3.0), guard=None)
+    guarded = SkillGate(FakeFacts(passes_s=3.0), None).hold(skill)
     outcome = await guarded.run({}, tell_nobody)
     assert (outcome.state, outcome.numbers) == (SkillState.TIMED_OUT, {"after_s": 5.0})
     assert skill.n_ended == 1
 
 
 async def test_arguments_that_do_not_fit_are_refused_before_anything_else(tmp_path: Path) -> None:
-    width = SkillParameter(name="width", kind=ParameterKind.NUMBER, most=0.1, is_required=True)
+    width = SkillParameter("width", ParameterKind.NUMBER, most=0.1, is_required=True)
     skill = FakeSkill(spec(parameters=(width,)))
-    guarded = GuardedSkill(skill, facts=FakeFacts(), guard=make_guard(tmp_path))
+    guarded = SkillGate(FakeFacts(), make_guard(tmp_path)).hold(skill)
     with pytest.raises(SkillError, match="width"):
         await guarded.run({"width": 2}, tell_nobody)
     assert (skill.given, list(audit_of(tmp_path))) == ([], [])

@@ -7,16 +7,11 @@ import pytest
 from mapspeak.errors import ConfigError
 from mapspeak.skill import (
     ParameterKind,
-    Precondition,
-    PreconditionKind,
-    SkillApproval,
     SkillEffect,
     SkillOutcome,
     SkillState,
 )
-from mapspeak.skills.comparing import Comparison
-from mapspeak.skills.owners.owned import OwnedSkill
-from mapspeak.skills.owners.skillsfile import READY_MADE, Called, OwnersEntry, load_skills
+from mapspeak.skills.skillsfile import READY_MADE, Called, OwnersEntry, load_skills
 from skillmaking import FakeSkill, spec, tell_nobody
 
 FULL = """
@@ -64,16 +59,11 @@ def test_an_entry_says_all_that_is_known_of_a_skill(tmp_path: Path) -> None:
         True,
     )
     assert quietly.kind is ParameterKind.FLAG
-    assert entry.success == Comparison("stalled", equals=False)
-    assert known.preconditions == (
-        Precondition(PreconditionKind.BATTERY_ABOVE, ratio=0.2),
-        Precondition(PreconditionKind.STANDING),
-        Precondition(PreconditionKind.IN_ROOM, room="R3"),
-    )
-    assert (known.timeout_s, known.effect, known.approval) == (
+    assert known.needs == {"battery_above": 0.2, "standing": True, "in_room": "R3"}
+    assert (known.timeout_s, known.effect, known.is_always_asked) == (
         10.0,
         SkillEffect.CHANGES,
-        SkillApproval.ALWAYS,
+        True,
     )
 
 
@@ -89,7 +79,7 @@ def test_an_entry_says_all_that_is_known_of_a_skill(tmp_path: Path) -> None:
         ("name: open_gripper", "name: Open it", "not of the form"),
         ("is: false", "was: false", "'skills.0.succeeded_when.was' is not a key"),
         ("{field: stalled, is: false}", "{field: stalled}", "needs one of: is, above, below"),
-        ("battery_above: 0.2", "battery_above: 20", "less than or equal to 1"),
+        ("battery_above: 0.2", "battery_above: 20", "battery_above cannot be 20"),
         ("effect: changes", "effect: explodes", "'explodes'"),
         ("name: side", "name: width", "two arguments of one name"),
         ("skills:\n", "skills:\n- {name: open_gripper, read: /x}\n", "two skills are called"),
@@ -118,7 +108,7 @@ def test_a_mistake_in_the_tree_of_a_mission_is_named_with_its_line_in_the_file(
 @pytest.mark.parametrize("name", READY_MADE)
 def test_what_ships_loads_and_wants_a_persons_word_for_the_pose(name: str) -> None:
     entries = {each.spec.name: each for each in load_skills(Path(name))}
-    assert entries["set_initial_pose"].spec.approval is SkillApproval.ALWAYS
+    assert entries["set_initial_pose"].spec.is_always_asked
     assert all(each.spec.description for each in entries.values())
 
 
@@ -136,7 +126,7 @@ async def test_fixed_and_free_arguments_reach_what_is_called_and_its_result_is_j
         raise AssertionError(name)
 
     async def run() -> SkillOutcome:
-        return await OwnedSkill(entry, open_called, find).run({"width": 0.01}, tell_nobody)
+        return await entry.run(open_called, find, {"width": 0.01}, tell_nobody)
 
     assert (await run()).state is SkillState.SUCCEEDED
     assert called.given == [{"command": "open", "position": 0.01}]

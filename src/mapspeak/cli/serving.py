@@ -284,7 +284,7 @@ def _build_server(
     from mapspeak.server.app import DEFAULT_TOOLSETS, build_server  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.tools.ros.inquiry import require_ros  # noqa: PLC0415
-    from mapspeak.skills.owners.skillsfile import load_skills  # noqa: PLC0415
+    from mapspeak.skills.skillsfile import load_skills  # noqa: PLC0415
 
     chosen = options.tools
     is_added = any(name.startswith("+") for name in chosen.sets)

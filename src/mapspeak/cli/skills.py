@@ -26,8 +26,8 @@ from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
     from mapspeak.server.tools.skills.book import SkillBook
-    from mapspeak.skills.owners.skillsfile import OwnersEntry
     from mapspeak.skills.runs import SkillRuns
+    from mapspeak.skills.skillsfile import OwnersEntry
 
 ROBOT_OPTION = click.option(
     "--robot", default=f"sim:{DEFAULT_WORLD}", show_default=True, help=ROBOT_HELP
@@ -83,7 +83,7 @@ def try_skill(
 
 
 def _load(file: Path) -> "tuple[OwnersEntry, ...]":
-    from mapspeak.skills.owners.skillsfile import load_skills  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.skills.skillsfile import load_skills  # noqa: PLC0415 - heavy; help must be quick
 
     return load_skills(file)
 
@@ -104,10 +104,11 @@ async def _open(
             await session.ros.wait_until_connected()
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(session.keep_watch)
-            runs = SkillRuns()
+            book = SkillBook(session, open_ros_access(session), entries)
+            runs = SkillRuns(questions=book.questions)
             tasks.start_soon(runs.keep_going, anyio.sleep_forever)
             await anyio.lowlevel.checkpoint()
-            yield SkillBook(session, open_ros_access(session), entries), runs
+            yield book, runs
             await session.close()
             tasks.cancel_scope.cancel()
 
@@ -132,7 +133,7 @@ async def _try(
     guard: GuardChoice,
 ) -> None:
     from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
-    from mapspeak.server.tools.skills.reports import say_run  # noqa: PLC0415
+    from mapspeak.server.tools.skills.running import say_run  # noqa: PLC0415
 
     async with _open(entries, robot, guard) as (book, runs):
         skill = book.find(name)

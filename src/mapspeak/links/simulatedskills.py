@@ -1,6 +1,6 @@
 """The simulated robot's skills besides driving: dock, doors, pallets, speech."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,16 +11,18 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
 from mapspeak.simulator import Equipment
 from mapspeak.skill import (
-    JsonValue,
+    Arguments,
     OnProgress,
     ParameterKind,
+    Skill,
     SkillCode,
     SkillEffect,
     SkillOutcome,
     SkillParameter,
     SkillProgress,
     SkillSpec,
-    SkillState,
+    failed,
+    succeeded,
 )
 
 if TYPE_CHECKING:
@@ -31,7 +33,6 @@ DOOR_S, LIFT_S, LETTERS_PER_S = 2.0, 6.0, 15.0
 LOOK_S = 0.5
 MOST_LETTERS = 300
 
-Arguments = Mapping[str, JsonValue]
 Doing = Callable[["Hands", Arguments, OnProgress], Awaitable[SkillOutcome]]
 
 
@@ -43,34 +44,18 @@ class Hands:
     equipment: Equipment
 
 
-@dataclass(frozen=True, slots=True)
-class SimulatedSkill:
-    """One skill of the simulated robot."""
-
-    spec: SkillSpec
-    hands: Hands
-    doing: Doing
-
-    async def run(self, arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
-        """Do it once; the first times fail that the world says do."""
-        has_fault = partial(self.hands.equipment.has_fault, self.spec.name)
-        if await self.hands.robot.compute(has_fault):
-            return _failed("The device reports a fault.", SkillCode.ABORTED)
-        return await self.doing(self.hands, arguments, on_progress)
-
-
-def build_skills(robot: "SimulatedRobot", equipment: Equipment) -> tuple[SimulatedSkill, ...]:
-    """Return all skills of a simulated robot."""
+def build_skills(robot: "SimulatedRobot", equipment: Equipment) -> tuple[Skill, ...]:
+    """Return all skills of a simulated robot; the first runs fail that the world says do."""
     hands = Hands(robot, equipment)
-    return tuple(SimulatedSkill(spec, hands, doing) for spec, doing in _SKILLS)
 
+    async def run(
+        spec: SkillSpec, doing: Doing, given: Arguments, on_progress: OnProgress
+    ) -> SkillOutcome:
+        if await robot.compute(partial(equipment.has_fault, spec.name)):
+            return failed(SkillCode.ABORTED, "The device reports a fault.")
+        return await doing(hands, given, on_progress)
 
-def _failed(quote: str, code: SkillCode = SkillCode.NOT_ACHIEVED) -> SkillOutcome:
-    return SkillOutcome(state=SkillState.FAILED, code=code, quote=quote)
-
-
-def _done(**outputs: JsonValue) -> SkillOutcome:
-    return SkillOutcome(state=SkillState.SUCCEEDED, outputs=outputs)
+    return tuple(Skill(spec, partial(run, spec, doing)) for spec, doing in _SKILLS)
 
 
 async def _dock(hands: Hands, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
@@ -78,22 +63,22 @@ async def _dock(hands: Hands, given: Arguments, on_progress: OnProgress) -> Skil
     robot, equipment = hands.robot, hands.equipment
     place = await robot.compute(equipment.find_dock)
     if place is None:
-        return _failed("No dock answers within 2.5 m.")
+        return failed(quote="No dock answers within 2.5 m.")
     if await robot.compute(equipment.dock_in_contact) is None:
         goal = (await robot.fetch_pose()).pose @ place
         if await _drive(robot, goal) is not GoalState.ARRIVED:
-            return _failed("The way onto the dock is blocked.", SkillCode.ABORTED)
+            return failed(SkillCode.ABORTED, "The way onto the dock is blocked.")
     dock = await robot.compute(equipment.dock_in_contact)
     if dock is None:
-        return _failed("The contacts of the dock do not touch.")
+        return failed(quote="The contacts of the dock do not touch.")
     await robot.compute(partial(equipment.note, "dock", dock.name))
     wanted = given["until_percent"] / 100
     while (charge := equipment.charge_ratio) < wanted:
         on_progress(SkillProgress(values={"battery_percent": round(100 * charge, 1)}))
         await robot.sleep(LOOK_S)
         if await robot.compute(equipment.dock_in_contact) is None:
-            return _failed("The robot has left the dock.", SkillCode.ABORTED)
-    return _done(battery_percent=round(100 * charge, 1))
+            return failed(SkillCode.ABORTED, "The robot has left the dock.")
+    return succeeded(battery_percent=round(100 * charge, 1))
 
 
 async def _drive(robot: "SimulatedRobot", goal: Pose) -> GoalState:
@@ -114,11 +99,11 @@ async def _open_door(hands: Hands, _given: Arguments, _told: OnProgress) -> Skil
     robot, equipment = hands.robot, hands.equipment
     door = await robot.compute(equipment.find_shut_door)
     if door is None:
-        return _failed("No shut door answers within 1.8 m.")
+        return failed(quote="No shut door answers within 1.8 m.")
     await robot.sleep(DOOR_S)
     await robot.compute(partial(equipment.open_door, door))
     await robot.compute(partial(equipment.note, "open_door", door.name))
-    return _done(width_m=door.width_m)
+    return succeeded(width_m=door.width_m)
 
 
 async def _move_pallet(
@@ -129,42 +114,26 @@ async def _move_pallet(
     pallet = await robot.compute(partial(equipment.find_pallet, is_lifted=not is_lifted))
     if pallet is None:
         which = "on the floor" if is_lifted else "that is lifted"
-        return _failed(f"No pallet {which} is within 1.8 m, or there is no forklift.")
+        return failed(quote=f"No pallet {which} is within 1.8 m, or there is no forklift.")
     await robot.sleep(LIFT_S)
     await robot.compute(partial(equipment.lift, pallet, is_lifted=is_lifted))
     await robot.compute(partial(equipment.note, skill, pallet.name))
-    return _done()
+    return succeeded()
 
 
 async def _speak(hands: Hands, given: Arguments, _told: OnProgress) -> SkillOutcome:
     await hands.robot.sleep(len(given["text"]) / LETTERS_PER_S)
     await hands.robot.compute(partial(hands.equipment.note, "speak", given["text"]))
-    return _done()
+    return succeeded()
 
 
 async def _read_battery(hands: Hands, _given: Arguments, _told: OnProgress) -> SkillOutcome:
-    return _done(battery_percent=round(100 * hands.equipment.charge_ratio, 1))
-
-
-def _spec(
-    name: str,
-    description: str,
-    *parameters: SkillParameter,
-    effect: SkillEffect = SkillEffect.CHANGES,
-    timeout_s: float = 60.0,
-) -> SkillSpec:
-    return SkillSpec(
-        name=name,
-        description=description,
-        effect=effect,
-        timeout_s=timeout_s,
-        parameters=parameters,
-    )
+    return succeeded(battery_percent=round(100 * hands.equipment.charge_ratio, 1))
 
 
 _UNTIL = SkillParameter(
-    name="until_percent",
-    kind=ParameterKind.NUMBER,
+    "until_percent",
+    ParameterKind.NUMBER,
     description="stay until the battery is so full",
     unit="%",
     least=0.0,
@@ -172,35 +141,30 @@ _UNTIL = SkillParameter(
     default=0.0,
 )
 _TEXT = SkillParameter(
-    name="text",
-    kind=ParameterKind.TEXT,
-    description="what to say",
-    most=MOST_LETTERS,
-    is_required=True,
+    "text", ParameterKind.TEXT, description="what to say", most=MOST_LETTERS, is_required=True
 )
+
+
+def _spec(
+    name: str,
+    description: str,
+    effect: SkillEffect = SkillEffect.CHANGES,
+    *parameters: SkillParameter,
+    timeout_s: float = 60.0,
+) -> SkillSpec:
+    return SkillSpec(name, description, effect, timeout_s=timeout_s, parameters=parameters)
+
+
+_MOVES, _CHANGES, _READS = SkillEffect.MOVES, SkillEffect.CHANGES, SkillEffect.READS
+_DOCK = "Drive onto a charging dock within 2.5 m, and charge there."
+_LIFT = "Have the forklift lift the pallet within 1.8 m."
+_LOWER = "Have the forklift put down the lifted pallet within 1.8 m."
+_SPEAK = "Say something aloud where the robot stands."
 _SKILLS: tuple[tuple[SkillSpec, Doing], ...] = (
-    (
-        _spec(
-            "dock",
-            "Drive onto a charging dock within 2.5 m, and charge there.",
-            _UNTIL,
-            effect=SkillEffect.MOVES,
-            timeout_s=1200.0,
-        ),
-        _dock,
-    ),
+    (_spec("dock", _DOCK, _MOVES, _UNTIL, timeout_s=1200.0), _dock),
     (_spec("open_door", "Open the nearest shut door within 1.8 m."), _open_door),
-    (
-        _spec("lift_pallet", "Have the forklift lift the pallet within 1.8 m."),
-        partial(_move_pallet, is_lifted=True),
-    ),
-    (
-        _spec("lower_pallet", "Have the forklift put down the lifted pallet within 1.8 m."),
-        partial(_move_pallet, is_lifted=False),
-    ),
-    (_spec("speak", "Say something aloud where the robot stands.", _TEXT), _speak),
-    (
-        _spec("read_battery", "Tell how full the battery is.", effect=SkillEffect.READS),
-        _read_battery,
-    ),
+    (_spec("lift_pallet", _LIFT), partial(_move_pallet, is_lifted=True)),
+    (_spec("lower_pallet", _LOWER), partial(_move_pallet, is_lifted=False)),
+    (_spec("speak", _SPEAK, _CHANGES, _TEXT), _speak),
+    (_spec("read_battery", "Tell how full the battery is.", _READS), _read_battery),
 )

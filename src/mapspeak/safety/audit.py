@@ -25,10 +25,12 @@ class Caller:
     Attributes:
         client: The client's session; empty where mapspeak acts by itself.
         tool: The tool it called.
+        session: The client's HTTP session; empty on stdio and for clients without one.
     """
 
     client: str = ""
     tool: str = ""
+    session: str = ""
 
 
 NOBODY = Caller()

@@ -32,7 +32,7 @@ from mapspeak.server.prompts import add_prompts
 from mapspeak.server.remarks import Remarks
 from mapspeak.server.text.offered import offering, say_error, write_instructions
 from mapspeak.server.text.wording import shorten_report, show_controls, show_controls_of
-from mapspeak.server.tools.asking import Asking
+from mapspeak.server.tools.asking import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess, open_ros_access
 from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.book import SkillBook
@@ -42,8 +42,8 @@ from mapspeak.server.toolsets import STOP, build_toolsets, choose_tools
 from mapspeak.server.view.chat import VIEW_MAP, ChatView, make_apps, offer_page
 from mapspeak.server.wire.calllog import CallNoting
 from mapspeak.session import Session
-from mapspeak.skills.owners.skillsfile import OwnersEntry
 from mapspeak.skills.runs import SkillRuns
+from mapspeak.skills.skillsfile import OwnersEntry
 
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
@@ -145,7 +145,8 @@ class MapspeakServer(MCPServer[Any]):
     async def _call_readably(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
-        caller = Caller(client=name_client(context), tool=name)
+        session_id = "" if context is None else client_of(context)
+        caller = Caller(client=name_client(context), tool=name, session=session_id)
         with self._session.client_is_heard(), calling(caller), offering(self._arguments):
             self._check_arguments(name, arguments)
             await self._remarks.meet(caller.client)
@@ -332,8 +333,8 @@ def build_server(
         session.episodes.close()
     elif session.ros is not None:
         session.ros.advertise_early()
-    ros, runs = open_ros_access(session), SkillRuns(partial(_count_stops, session))
-    book = SkillBook(session, ros, skills)
+    book = SkillBook(session, ros := open_ros_access(session), skills)
+    runs = SkillRuns(partial(_count_stops, session), book.questions)
     known = build_toolsets(session, representation, ros=ros, runs=runs, book=book)
     sets = {*toolsets} | ({"skills"} if expose or skills else set())
     tools = {*tools} | ({STOP} if expose or skills else set())

@@ -46,7 +46,7 @@ def build_toolsets(
     """
     find, ros, runs = FindTools(session), ros or open_ros_access(session), runs or SkillRuns()
     book = book or SkillBook(session, ros)
-    run_tools = SkillRunTools(runs, book.questions)
+    run_tools = SkillRunTools(runs)
     return {
         "look": tools_of(LookTools(session, representation)),
         "places": tools_of(find, PlaceTools(session)),

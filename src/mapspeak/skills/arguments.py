@@ -5,9 +5,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from mapspeak.errors import SkillError
-from mapspeak.skill import JsonValue, ParameterKind, SkillParameter
+from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillParameter
 
 MOST_SHOWN = 60
+NUMBERS = (ParameterKind.NUMBER, ParameterKind.WHOLE)
 WANTED = {
     ParameterKind.NUMBER: "a number",
     ParameterKind.WHOLE: "a whole number",
@@ -20,39 +21,32 @@ WANTED = {
 
 
 def check_arguments(
-    parameters: Sequence[SkillParameter], arguments: Mapping[str, JsonValue], *, skill: str
+    parameters: Sequence[SkillParameter], arguments: Arguments, *, skill: str, path: str = ""
 ) -> dict[str, JsonValue]:
     """Return the arguments of a skill, with defaults for missing ones.
+
+    Args:
+        path: The argument that these are fields of, such as "goal.via[2]."; empty for none.
 
     Raises:
         SkillError: They do not fit; names which, and what it must be.
     """
-    return _check_fields(parameters, arguments, path="", what=skill)
-
-
-def _check_fields(
-    parameters: Sequence[SkillParameter],
-    given: Mapping[str, JsonValue],
-    *,
-    path: str,
-    what: str,
-) -> dict[str, JsonValue]:
     known = {each.name: each for each in parameters}
-    for name in given:
-        if name not in known:
-            raise _stranger(str(name), list(known), what)
+    if stranger := next((str(name) for name in arguments if name not in known), None):
+        near = difflib.get_close_matches(stranger, known, n=1)
+        takes = f"It takes {', '.join(known)}." if known else "It takes none."
+        hint = f"Did you mean {near[0]}? {takes}" if near else takes
+        raise SkillError(f"{skill} takes no {stranger[:MOST_SHOWN]!r}.", hint=hint)
     checked: dict[str, JsonValue] = {}
     for name, parameter in known.items():
-        where = f"{path}.{name}" if path else name
-        if name in given:
-            checked[name] = check_value(parameter, given[name], where=where, what=what)
+        if name in arguments:
+            checked[name] = check_value(
+                parameter, arguments[name], where=f"{path}{name}", what=skill
+            )
         elif parameter.default is not None:
             checked[name] = parameter.default
         elif parameter.is_required:
-            raise SkillError(
-                f"{what} needs {where}.",
-                hint=f"Give {say_wanted(parameter)}.",
-            )
+            raise SkillError(f"{skill} needs {path}{name}.", hint=f"Give {say_wanted(parameter)}.")
     return checked
 
 
@@ -66,26 +60,29 @@ def check_value(parameter: SkillParameter, value: JsonValue, *, where: str, what
     Raises:
         SkillError: It does not fit.
     """
+    fitting: JsonValue = None
     match parameter.kind:
         case ParameterKind.NUMBER | ParameterKind.WHOLE:
             fitting = _number(parameter, value)
-        case ParameterKind.TEXT | ParameterKind.BYTES:
-            is_text = isinstance(value, str)
-            is_fitting = is_text and (parameter.most is None or len(value) <= parameter.most)
-            fitting = value if is_fitting else None
-        case ParameterKind.FLAG:
-            fitting = value if isinstance(value, bool) else None
-        case ParameterKind.LIST:
-            fitting = _list(parameter, value, where=where, what=what)
-        case ParameterKind.OBJECT:
-            is_object = isinstance(value, Mapping)
-            fitting = (
-                _check_fields(parameter.fields, value, path=where, what=what) if is_object else None
-            )
-    is_chosen = not parameter.choices or fitting in parameter.choices
-    if fitting is None or not is_chosen:
+        case ParameterKind.TEXT | ParameterKind.BYTES if isinstance(value, str):
+            fitting = value if _is_within(parameter, len(value)) else None
+        case ParameterKind.FLAG if isinstance(value, bool):
+            fitting = value
+        case ParameterKind.LIST if isinstance(value, list | tuple):
+            if _is_within(parameter, len(value)):
+                fitting = [
+                    each
+                    if parameter.item is None
+                    else check_value(parameter.item, each, where=f"{where}[{number}]", what=what)
+                    for number, each in enumerate(value)
+                ]
+        case ParameterKind.OBJECT if isinstance(value, Mapping):
+            fitting = check_arguments(parameter.fields, value, skill=what, path=f"{where}.")
+    if fitting is None or (parameter.choices and fitting not in parameter.choices):
+        shown = repr(value)
+        shown = shown if len(shown) <= MOST_SHOWN else f"{shown[: MOST_SHOWN - 3]}..."
         raise SkillError(
-            f"{what}: {where} cannot be {_shown(value)}.", hint=f"Give {say_wanted(parameter)}."
+            f"{what}: {where} cannot be {shown}.", hint=f"Give {say_wanted(parameter)}."
         )
     return fitting
 
@@ -94,67 +91,32 @@ def say_wanted(parameter: SkillParameter) -> str:
     """Return what a parameter takes, such as "a number from 0 to 0.085 m"."""
     if parameter.choices:
         return f"one of {', '.join(map(str, parameter.choices))}"
-    wanted, most = WANTED[parameter.kind], parameter.most
-    if parameter.kind in (ParameterKind.NUMBER, ParameterKind.WHOLE):
-        return f"{wanted}{_say_limits(parameter)}"
+    wanted, least, most = WANTED[parameter.kind], parameter.least, parameter.most
+    if parameter.kind in NUMBERS:
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        from_least = "" if least is None else f" from {least:.15g}"
+        to_most = "" if most is None else f" to {most:.15g}"
+        return f"{wanted}{from_least}{to_most}{unit}"
     if most is None:
         return wanted
-    if parameter.kind is ParameterKind.LIST:
-        how_many = "" if parameter.least == most else "at most "
-        return f"a list of {how_many}{most:g} values"
-    return f"{wanted} of at most {most:g} letters"
+    if parameter.kind is not ParameterKind.LIST:
+        return f"{wanted} of at most {most:g} letters"
+    return f"a list of {'' if least == most else 'at most '}{most:g} values"
 
 
-def _say_limits(parameter: SkillParameter) -> str:
-    unit = f" {parameter.unit}" if parameter.unit else ""
-    least, most = parameter.least, parameter.most
-    if least is not None and most is not None:
-        return f" from {least:.15g} to {most:.15g}{unit}"
-    if least is not None:
-        return f" of at least {least:.15g}{unit}"
-    return unit if most is None else f" of at most {most:.15g}{unit}"
+def _is_within(parameter: SkillParameter, size: float) -> bool:
+    is_small = parameter.least is not None and size < parameter.least
+    is_large = parameter.most is not None and size > parameter.most
+    return not (is_small or is_large)
 
 
 def _number(parameter: SkillParameter, value: JsonValue) -> JsonValue | None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    if isinstance(value, float) and not math.isfinite(value):
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value):
         return None
     if parameter.kind is ParameterKind.WHOLE:
         # Models write 3.0 for 3.
         if value != int(value):
             return None
         value = int(value)
-    is_small = parameter.least is not None and value < parameter.least
-    is_large = parameter.most is not None and value > parameter.most
-    return None if is_small or is_large else value
-
-
-def _list(
-    parameter: SkillParameter, value: JsonValue, *, where: str, what: str
-) -> list[JsonValue] | None:
-    if not isinstance(value, list | tuple):
-        return None
-    is_short = parameter.least is not None and len(value) < parameter.least
-    is_long = parameter.most is not None and len(value) > parameter.most
-    if is_short or is_long:
-        return None
-    item = parameter.item
-    if item is None:
-        return list(value)
-    return [
-        check_value(item, each, where=f"{where}[{number}]", what=what)
-        for number, each in enumerate(value)
-    ]
-
-
-def _stranger(name: str, known: list[str], what: str) -> SkillError:
-    near = difflib.get_close_matches(name, known, n=1)
-    takes = f"It takes {', '.join(known)}." if known else "It takes none."
-    hint = f"Did you mean {near[0]}? {takes}" if near else takes
-    return SkillError(f"{what} takes no {name[:MOST_SHOWN]!r}.", hint=hint)
-
-
-def _shown(value: JsonValue) -> str:
-    shown = repr(value)
-    return shown if len(shown) <= MOST_SHOWN else f"{shown[: MOST_SHOWN - 3]}..."
+    return value if _is_within(parameter, value) else None

@@ -2,7 +2,7 @@
 
 import logging
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from functools import partial
 
 import anyio
@@ -10,7 +10,7 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError, SkillError
 from mapspeak.skill import (
-    JsonValue,
+    Arguments,
     Skill,
     SkillCode,
     SkillEffect,
@@ -18,6 +18,7 @@ from mapspeak.skill import (
     SkillProgress,
     SkillState,
 )
+from mapspeak.skills.questions import QuestionBook
 
 MOST_KEPT = 200
 MOST_AT_ONCE = 20
@@ -37,24 +38,23 @@ class SkillRun:
     Attributes:
         handle: Its name for the model, such as "S1".
         client: Its owner; it ends when that client is gone.
-        begun_s: By the event loop's clock, as are all times here.
-        ended_s: None while it goes on.
+        n_stops_before: The count of stops when it began.
         progress: The latest; None before the first.
         outcome: None while it goes on, and where it could not be begun.
         error: Why it could not be begun.
     """
 
-    def __init__(self, handle: str, skill: Skill, *, client: str, n_stops_before: int = 0) -> None:
+    def __init__(self, handle: str, skill: Skill, *, client: str, n_stops_before: int) -> None:
         self.handle = handle
         self.skill = skill
         self.client = client
         self.n_stops_before = n_stops_before
-        self.begun_s = anyio.current_time()
-        self.ended_s: float | None = None
         self.progress: SkillProgress | None = None
         self.n_progress = 0
         self.outcome: SkillOutcome | None = None
         self.error: MapspeakError | None = None
+        self._begun_s = anyio.current_time()
+        self._ended_s: float | None = None
         self._scope = anyio.CancelScope()
         self._news = anyio.Event()
         self._why = SkillCode.CANCELLED
@@ -62,7 +62,7 @@ class SkillRun:
     @property
     def is_over(self) -> bool:
         """True when nothing more will happen."""
-        return self.ended_s is not None
+        return self._ended_s is not None
 
     @property
     def state(self) -> SkillState:
@@ -79,24 +79,23 @@ class SkillRun:
     @property
     def passed_s(self) -> float:
         """How long it has taken, or took, in wall time."""
-        until_s = anyio.current_time() if self.ended_s is None else self.ended_s
-        return until_s - self.begun_s
+        return (self._ended_s or anyio.current_time()) - self._begun_s
 
-    async def do(self, arguments: Mapping[str, JsonValue]) -> None:
+    async def do(self, arguments: Arguments) -> None:
         """Run the skill, and keep its outcome or error."""
         try:
             with self._scope:
                 self.outcome = await self.skill.run(arguments, self._take_progress)
             if self.outcome is None:
-                self.outcome = SkillOutcome(state=SkillState.CANCELLED, code=self._why)
+                self.outcome = SkillOutcome(SkillState.CANCELLED, self._why)
         except MapspeakError as error:
             self.error = error
         except Exception:
             # One faulty skill must not end all that goes on beside it.
             logger.exception("The skill %s failed by a mistake in it", self.skill.spec.name)
-            self.outcome = SkillOutcome(state=SkillState.FAILED, code=SkillCode.LOST)
+            self.outcome = SkillOutcome(SkillState.FAILED, SkillCode.LOST)
         finally:
-            self.ended_s = anyio.current_time()
+            self._ended_s = anyio.current_time()
             self._tell()
 
     async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
@@ -112,16 +111,16 @@ class SkillRun:
                 if on_news is not None and self.n_progress != n_before:
                     await on_news(self)
 
-    def give_up(self, why: SkillCode = SkillCode.CANCELLED) -> None:
+    async def cancel(self, why: SkillCode = SkillCode.CANCELLED) -> None:
+        """End it, and return when it has ended: nothing of it is left at the robot then."""
+        self.give_up(why)
+        while not self.is_over:
+            await self._news.wait()
+
+    def give_up(self, why: SkillCode) -> None:
         """Have it end."""
         self._why = why
         self._scope.cancel()
-
-    async def cancel(self) -> None:
-        """End it, and return when it has ended: nothing of it is left at the robot then."""
-        self.give_up()
-        while not self.is_over:
-            await self._news.wait()
 
     def _take_progress(self, progress: SkillProgress) -> None:
         self.progress = progress
@@ -139,9 +138,15 @@ class SkillRuns:
     Args:
         count_stops: Changes at each stop of the robot, which ends all runs but those that only
             read.
+        questions: The questions that runs ask.
     """
 
-    def __init__(self, count_stops: Callable[[], int] = lambda: 0) -> None:
+    def __init__(
+        self,
+        count_stops: Callable[[], int] = lambda: 0,
+        questions: QuestionBook | None = None,
+    ) -> None:
+        self.questions = questions or QuestionBook()
         self._count_stops = count_stops
         self._runs: OrderedDict[str, SkillRun] = OrderedDict()
         self._n_begun = 0
@@ -174,7 +179,7 @@ class SkillRuns:
     async def begin(
         self,
         skill: Skill,
-        arguments: Mapping[str, JsonValue],
+        arguments: Arguments,
         *,
         client: str = "",
         wait_s: float,
@@ -194,11 +199,12 @@ class SkillRuns:
                 f"{MOST_AT_ONCE} skills are being run at once.", hint="Wait for one, or cancel it."
             )
         self._n_begun += 1
-        run = SkillRun(
-            f"S{self._n_begun}", skill, client=client, n_stops_before=self._count_stops()
-        )
-        self._runs[run.handle] = run
-        self._forget_old()
+        handle, n_stops = f"S{self._n_begun}", self._count_stops()
+        run = SkillRun(handle, skill, client=client, n_stops_before=n_stops)
+        over = [each.handle for each in self._runs.values() if each.is_over]
+        for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:
+            del self._runs[old]
+        self._runs[handle] = run
         self._tasks.start_soon(partial(run.do, dict(arguments)))
         try:
             await run.wait(wait_s=max(wait_s, BEGINS_S), on_news=on_news)
@@ -207,7 +213,7 @@ class SkillRuns:
                 await run.cancel()
             raise
         if run.error is not None:
-            del self._runs[run.handle]
+            del self._runs[handle]
             raise run.error
         return run
 
@@ -228,12 +234,8 @@ class SkillRuns:
         return run
 
     async def client_is_gone(self, client: str) -> None:
-        """End the runs of a client that has gone away."""
+        """End the runs of a client that has gone away; anyone may answer those that go on."""
+        self.questions.client_is_gone(client)
         for run in self.under_way:
             if run.client == client:
                 await run.cancel()
-
-    def _forget_old(self) -> None:
-        over = [run for run in self._runs.values() if run.is_over]
-        for run in over[: max(len(self._runs) - MOST_KEPT, 0)]:
-            del self._runs[run.handle]

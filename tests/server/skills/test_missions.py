@@ -14,7 +14,6 @@ from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.skill import (
     JsonValue,
     ParameterKind,
-    SkillApproval,
     SkillCode,
     SkillOutcome,
     SkillParameter,
@@ -220,12 +219,12 @@ async def test_a_skill_that_vanishes_or_breaks_mid_mission_fails_its_step_alone(
 
     async def vanish(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:
         here.clear()
-        return SkillOutcome(state=SkillState.FAILED, code=SkillCode.NOT_OFFERED)
+        return SkillOutcome(state=SkillState.FAILED, code=SkillCode.LOST)
 
     here[0].do = vanish
     async with missions(tmp_path, here[0]) as caller:
         told = await caller.ask("run_mission", tree="fallback: [lift, {note: no lift}]")
-    assert "lift: failed (not_offered)" in told
+    assert "lift: failed (lost)" in told
     assert "note: succeeded" in told
 
 
@@ -273,7 +272,7 @@ QUEUE = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE
 
 async def test_one_approval_covers_a_mission_and_not_the_next_one(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, Policy(approval=QUEUE))
-    dock = FakeSkill(spec("dock", approval=SkillApproval.ALWAYS))
+    dock = FakeSkill(spec("dock", is_always_asked=True))
     tree = "- drive: R2\n- dock\n- drive: R1\n"
     async with missions(tmp_path, dock, guard=guard) as caller:
         asked = await caller.refuse("run_mission", tree=tree)

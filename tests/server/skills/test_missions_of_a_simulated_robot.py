@@ -19,7 +19,7 @@ from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateRecord
-from mapspeak.skills.owners.skillsfile import OwnersEntry, load_skills
+from mapspeak.skills.skillsfile import OwnersEntry, load_skills
 from rosserved import Caller
 from skilledworld import make_workshop
 

@@ -10,7 +10,7 @@ from guarding import make_guard
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.hub import Topic
 from mapspeak.safety import Approval, Otherwise, Policy
-from mapspeak.skills.owners.skillsfile import OwnersEntry, load_skills
+from mapspeak.skills.skillsfile import OwnersEntry, load_skills
 
 pytestmark = pytest.mark.anyio
 both = pytest.mark.parametrize("dialect", Dialect)

@@ -12,7 +12,7 @@ from anyio.streams.memory import MemoryObjectReceiveStream, MemoryObjectSendStre
 
 from mapspeak.errors import MapspeakError
 from mapspeak.robot import CameraPicture
-from mapspeak.server.text.missions import draw_plan, say_question
+from mapspeak.server.text.skills import draw_mission, say_question
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.document import CallView, GridView, MissionsView, PoseView, RobotView
@@ -202,11 +202,11 @@ class ViewFeed:
 def _describe_missions(book: SkillBook) -> MissionsView:
     course = book.desk.latest
     return MissionsView(
-        latest=None if course is None else draw_plan(course.plan),
+        latest=None if course is None else draw_mission(course.mission),
         is_over=course is None or course.is_over,
         states={} if course is None else {n: str(each) for n, each in course.states.items()},
         questions=tuple(map(say_question, book.questions.waiting)),
-        saved=tuple(draw_plan(each.plan) for each in book.saved.values()),
+        saved=tuple(draw_mission(each) for each in book.saved.values()),
     )
 
 

@@ -12,17 +12,17 @@ from mcp_types import Tool as ListedTool
 from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import say_error
+from mapspeak.server.text.skills import describe_skill
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
-from mapspeak.server.tools.skills.reports import describe_skill, say_run
-from mapspeak.server.tools.skills.running import tell_news
+from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter
 from mapspeak.skills.arguments import check_value
 from mapspeak.skills.runs import SkillRuns
 
 WAIT = SkillParameter(
-    name="wait_s",
-    kind=ParameterKind.NUMBER,
+    "wait_s",
+    ParameterKind.NUMBER,
     unit="s to wait for its end",
     least=0.0,
     most=LONGEST_WAIT_S,
@@ -54,53 +54,51 @@ class SkillBoard:
 
     Attributes:
         is_read_only: It takes only skills that read.
+        n_changes: Counts what was put up and taken down.
     """
 
     def __init__(self, runs: SkillRuns, *, others: Callable[[], Collection[str]]) -> None:
         self.runs = runs
-        self._others = others
         self.is_read_only = False
-        self._skills: dict[str, Skill] = {}
-        self._listed: dict[str, ListedTool] = {}
         self.n_changes = 0
+        self._others = others
+        self._offered: dict[str, tuple[Skill, ListedTool]] = {}
 
     @property
     def skills(self) -> Mapping[str, Skill]:
         """The skills by the names of their tools."""
-        return self._skills
+        return {name: skill for name, (skill, _) in self._offered.items()}
 
     @property
     def listed(self) -> Iterable[ListedTool]:
         """The tools as clients are told of them."""
-        return self._listed.values()
+        return [tool for _, tool in self._offered.values()]
 
     @property
     def taken_names(self) -> set[str]:
         """The names that another tool or skill has."""
-        return {*self._others(), *self._skills}
+        return {*self._others(), *self._offered}
 
     def put_up(self, skill: Skill) -> None:
         """Offer a skill under its name, in place of one of that name."""
         spec = skill.spec
-        if self.is_read_only and spec.effect is not SkillEffect.READS:
+        reads = spec.effect is SkillEffect.READS
+        if self.is_read_only and not reads:
             return
-        parameters = (*spec.parameters, *((WAIT,) if _is_long(skill) else ()))
-        reads = ToolAnnotations(read_only_hint=True)
         acts = ToolAnnotations(open_world_hint=False)
-        self._skills[spec.name] = skill
-        self._listed[spec.name] = ListedTool(
+        tool = ListedTool(
             name=spec.name,
             title=quote(spec.description or spec.name, most=MOST_TITLE).strip('"'),
             description=describe_skill(spec),
-            input_schema=schema_of(parameters),
-            annotations=reads if spec.effect is SkillEffect.READS else acts,
+            input_schema=schema_of((*spec.parameters, *((WAIT,) if _is_long(skill) else ()))),
+            annotations=ToolAnnotations(read_only_hint=True) if reads else acts,
         )
+        self._offered[spec.name] = (skill, tool)
         self.n_changes += 1
 
     def take_down(self, name: str) -> None:
         """Withdraw a skill; its runs go on."""
-        if self._skills.pop(name, None) is not None:
-            del self._listed[name]
+        if self._offered.pop(name, None) is not None:
             self.n_changes += 1
 
     async def call(
@@ -111,8 +109,7 @@ class SkillBoard:
         Raises:
             ToolError: It could not be begun.
         """
-        skill = self._skills[name]
-        own = dict(arguments)
+        skill, own = self._offered[name][0], dict(arguments)
         try:
             wait_s = LONGEST_WAIT_S
             if _is_long(skill):

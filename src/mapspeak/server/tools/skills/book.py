@@ -1,8 +1,7 @@
 """All skills of one server by their names: built in, the robot's own, its owner's, missions."""
 
 import logging
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -13,35 +12,18 @@ from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.facts import SessionFacts
 from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
-from mapspeak.server.tools.skills.leaves import DriveSkill, LookSkill, NoteSkill
+from mapspeak.server.tools.skills.leaves import Leaves
 from mapspeak.session import Session
 from mapspeak.skill import Skill
-from mapspeak.skills.guarded import GuardedSkill
-from mapspeak.skills.missions.conditions import CheckSkill, WaitForSkill, WaitSkill
-from mapspeak.skills.missions.mission import MissionDesk, MissionSkill
-from mapspeak.skills.missions.questions import AskSkill, QuestionBook
-from mapspeak.skills.missions.reading import CONTROL
-from mapspeak.skills.missions.record import Interrupted, MissionRecord
-from mapspeak.skills.missions.tree import MissionPlan
-from mapspeak.skills.owners.owned import OwnedSkill
-from mapspeak.skills.owners.skillsfile import Called, OwnersEntry, load_skills
-
-INTERFACES = {
-    Called.SERVICE: InterfaceKind.SERVICE,
-    Called.ACTION: InterfaceKind.ACTION,
-    Called.PUBLISH: InterfaceKind.PUBLISH,
-    Called.READ: InterfaceKind.READ,
-}
+from mapspeak.skills.guarding import SkillGate
+from mapspeak.skills.mission import MissionDesk
+from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.missiontree import Mission, MissionChecker
+from mapspeak.skills.questions import QuestionBook
+from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
+from mapspeak.skills.treereading import CONTROL
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class SavedMission:
-    """A mission that was saved, and the file that it is in."""
-
-    path: Path
-    plan: MissionPlan
 
 
 class SkillBook:
@@ -54,55 +36,46 @@ class SkillBook:
 
     Attributes:
         questions: Those that missions ask.
+        desk: Runs missions.
         folder: Where missions are saved.
+        saved: The missions that were saved, by name.
         interrupted: Missions that an earlier server did not live to end.
     """
 
     def __init__(
         self, session: Session, ros: RosAccess, entries: Sequence[OwnersEntry] = ()
     ) -> None:
-        self._session = session
         self._ros = ros
         self._board: SkillBoard | None = None
         self.questions = QuestionBook()
-        self.facts = SessionFacts(session, ros)
         self.folder = memory_folder(session.memory.path) / "missions"
         record = MissionRecord(self.folder / "record.jsonl", wall_clock=session.find_wall_time)
-        self.desk = MissionDesk(
-            find_skill=self.find,
-            list_skills=lambda: sorted(self.skills),
-            facts=self.facts,
-            guard=session.guard,
-            record=record,
-            present=session.client_is_heard,
-        )
-        self.interrupted: tuple[Interrupted, ...] = record.take_interrupted()
+        self.interrupted = record.take_interrupted()
         for each in self.interrupted:
             logger.warning("The mission %s was interrupted: its server ended.", each.name)
-        built_in = (
-            *(DriveSkill(session), LookSkill(session, self.questions), NoteSkill(session)),
-            *(CheckSkill(self.facts), WaitForSkill(self.facts), WaitSkill(self.facts)),
-            AskSkill(self.questions, self.facts),
-        )
-        self._built_in = {each.spec.name: self._guard(each, is_own=True) for each in built_in}
+        facts = SessionFacts(session, ros)
+        self._gate = SkillGate(facts, session.guard)
+        checker = MissionChecker(self.find, lambda: sorted(self.skills))
+        self.desk = MissionDesk(checker, self._gate, record, present=session.client_is_heard)
+        leaves = Leaves(session, facts, self.questions).list_skills()
+        self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
         own = () if session.skilled is None else session.skilled.skills
-        self._own: dict[str, Skill] = {each.spec.name: self._guard(each) for each in own}
-        self._owned = {each.spec.name: self._open(each) for each in entries}
-        self._saved: dict[str, SavedMission] = {}
-        self._check_names(entries)
+        self._own = _by_name(self._gate.hold(each) for each in own)
+        for entry in entries:
+            if entry.name in (*self._built_in, *CONTROL):
+                raise ConfigError(
+                    f"skills.yaml: {entry.name!r} is a word of missions.", hint="Rename the skill."
+                )
+        self._owned = _by_name(self._open(each) for each in entries)
+        self._files: dict[str, tuple[Path, OwnersEntry]] = {}
+        self.saved: dict[str, Mission] = {}
         self.load_saved()
 
     @property
     def skills(self) -> Mapping[str, Skill]:
         """All that a mission can use, with the interfaces that are exposed now."""
         exposed = {} if self._board is None else self._board.skills
-        saved = {name: self.plan(each.plan) for name, each in self._saved.items()}
-        return {**exposed, **self._own, **self._owned, **saved, **self._built_in}
-
-    @property
-    def saved(self) -> Mapping[str, SavedMission]:
-        """The missions that were saved, by name."""
-        return self._saved
+        return {**exposed, **self._own, **self._owned, **self.saved, **self._built_in}
 
     def find(self, name: str) -> Skill:
         """Return a skill by its name.
@@ -118,30 +91,29 @@ class SkillBook:
     def put_up(self, board: SkillBoard) -> None:
         """Offer the robot's own skills, the owner's and the saved missions as tools."""
         self._board = board
-        for skill in (*self._own.values(), *self._owned.values()):
+        for skill in (*self._own.values(), *self._owned.values(), *self.saved.values()):
             board.put_up(skill)
-        for name in self._saved:
-            board.put_up(self.find(name))
 
     def load_saved(self) -> None:
         """Read the saved missions anew; people may have edited the files."""
-        found: dict[str, SavedMission] = {}
+        before, self._files = self._files, {}
         for path in sorted(self.folder.glob("*.yaml")):
             try:
                 entries = load_skills(path)
             except ConfigError as error:
                 logger.warning("%s", error)
                 continue
-            for each in entries:
-                if (plan := _plan_of(each)) is not None:
-                    found[each.spec.name] = SavedMission(path, plan)
-        before, self._saved = self._saved, found
-        if self._board is not None:
-            for name in before.keys() - found.keys():
+            missions = (each for each in entries if each.calls is Called.MISSION)
+            self._files |= {each.name: (path, each) for each in missions}
+        for name in before.keys() - self._files.keys():
+            del self.saved[name]
+            if self._board is not None:
                 self._board.take_down(name)
-            for name, saved in found.items():
-                if before.get(name) != saved:
-                    self._board.put_up(self.plan(saved.plan))
+        for name, (path, entry) in self._files.items():
+            if before.get(name) != (path, entry):
+                self.saved[name] = self.open_mission(entry, path)
+                if self._board is not None:
+                    self._board.put_up(self.saved[name])
 
     def check_free(self, name: str) -> None:
         """Return when a mission may be saved under a name.
@@ -151,23 +123,25 @@ class SkillBook:
         """
         taken = {*self._built_in, *self._own, *self._owned, *CONTROL}
         tools = () if self._board is None else self._board.taken_names
-        if name in taken or (name in tools and name not in self._saved):
+        if name in taken or (name in tools and name not in self.saved):
             raise SkillError(f"{name!r} is taken.", hint="Choose another name.")
 
-    def plan(self, plan: MissionPlan) -> MissionSkill:
-        """Return a mission as a skill."""
-        return MissionSkill(plan, self.desk)
-
-    def _guard(self, skill: Skill, *, is_own: bool = False) -> Skill:
-        guard = self._session.guard
-        return GuardedSkill(skill, facts=self.facts, guard=guard, is_through_guard=is_own)
-
     def _open(self, entry: OwnersEntry) -> Skill:
-        if (plan := _plan_of(entry)) is not None:
-            return self.plan(plan)
+        """Return a skill of a file, held to the policy."""
+        if entry.calls is Called.MISSION:
+            return self.open_mission(entry)
+        run = partial(entry.run, partial(self._find_called, entry), self.find)
         is_ros = entry.calls is not Called.ROBOT_SKILL
-        owned = OwnedSkill(entry, partial(self._find_called, entry), self.find)
-        return self._guard(owned, is_own=is_ros)
+        return self._gate.hold(Skill(entry.spec, run), is_through_guard=is_ros)
+
+    def open_mission(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
+        """Return the mission that is written in an entry.
+
+        Raises:
+            SkillError: Its tree has a mistake.
+        """
+        remember = tuple(entry.remember)
+        return self.desk.open(entry.spec, entry.tree, remember=remember, path=path)
 
     async def _find_called(self, entry: OwnersEntry) -> Skill:
         """Return the interface that a skill of skills.yaml calls, as the robot offers it now.
@@ -184,43 +158,29 @@ class SkillBook:
                 )
             return own
         name, inquiry = full_name(entry.target), self._ros.inquiry
-        match entry.calls:
-            case Called.SERVICE:
-                kind = entry.type or await inquiry.fetch_service_type(name)
-            case Called.ACTION:
-                kind = entry.type or await inquiry.fetch_action_type(name)
-            case _:
-                kind = entry.type or await inquiry.fetch_topic_type(name)
-        interface = Interface(INTERFACES[entry.calls], name, kind)
-        return await open_interface(interface, self._ros, name=entry.spec.name)
+        fetch = {
+            Called.SERVICE: inquiry.fetch_service_type,
+            Called.ACTION: inquiry.fetch_action_type,
+        }.get(entry.calls, inquiry.fetch_topic_type)
+        type_name = entry.type or await fetch(name)
+        interface = Interface(InterfaceKind(entry.calls), name, type_name)
+        return await open_interface(interface, self._ros, name=entry.name)
 
     async def check_entry(self, entry: OwnersEntry) -> str:
         """Return the fault of a skill of skills.yaml at this robot; empty without one."""
         try:
-            if (plan := _plan_of(entry)) is not None:
-                self.desk.check(plan)
+            if entry.calls is Called.MISSION:
+                self.desk.check(self.open_mission(entry))
                 return ""
             called = await self._find_called(entry)
         except MapspeakError as error:
             return str(error)
         takes = {each.name for each in called.spec.parameters}
-        strangers = {*entry.fixed, *entry.renamed.values()} - takes
-        if strangers:
+        if strangers := {*entry.fixed, *entry.sets.values()} - takes:
             has = ", ".join(sorted(takes)) or "nothing"
             return f"{entry.target} takes no {', '.join(sorted(strangers))}. It takes {has}."
         return ""
 
-    def _check_names(self, entries: Sequence[OwnersEntry]) -> None:
-        for each in entries:
-            if each.spec.name in (*self._built_in, *CONTROL):
-                raise ConfigError(
-                    f"skills.yaml: {each.spec.name!r} is a word of missions.",
-                    hint="Rename the skill.",
-                )
 
-
-def _plan_of(entry: OwnersEntry) -> MissionPlan | None:
-    """Return the mission that a skill of a file is; None for any other."""
-    if entry.tree is None:
-        return None
-    return MissionPlan(spec=entry.spec, tree=entry.tree, remember=entry.remember)
+def _by_name(skills: Iterable[Skill]) -> dict[str, Skill]:
+    return {each.spec.name: each for each in skills}

@@ -4,26 +4,22 @@ import fnmatch
 import logging
 import math
 import re
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
+from functools import partial
 
 import anyio
 
 from mapspeak.errors import LinkError, MapspeakError, PolicyError
 from mapspeak.ros.messages.fields import bare_type
 from mapspeak.ros.port import RosGraph
-from mapspeak.safety import Act, Call, GuardedConnection, Publish
+from mapspeak.safety import GuardedConnection
 from mapspeak.server.tools.ros.census import fetch_hearers, fetch_publishers
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import actions_of
 from mapspeak.server.tools.ros.services import FOLDED
 from mapspeak.server.tools.skills.board import RESERVED, SkillBoard, name_tool
-from mapspeak.server.tools.skills.interfaces import (
-    Interface,
-    InterfaceKind,
-    InterfaceSkill,
-    open_interface,
-)
+from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
 
 MOST_EXPOSED = 100
 """Tools; a model that reads more of them reads nothing else."""
@@ -32,6 +28,8 @@ EVERY_S = 2.0
 KEPT_S = 20.0
 """Wall time for which a type, or the ends of a topic, are not asked for again while it is there."""
 PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
+PREFIXES = {InterfaceKind.PUBLISH: "publish_", InterfaceKind.READ: "read_"}
+Find = Callable[[str], Awaitable[list[Interface]]]
 
 logger = logging.getLogger(__name__)
 
@@ -63,7 +61,7 @@ class Exposure:
         self._every_s = every_s
         self._offered: dict[Interface, str] = {}
         self._left_out: set[Interface] = set()
-        self._answers: dict[str, tuple[list[Interface], float]] = {}
+        self._answers: dict[tuple[str, str], tuple[list[Interface], float]] = {}
 
     async def keep_looking(self) -> None:
         """Look again and again; a robot out of reach keeps its tools until it is back.
@@ -101,25 +99,20 @@ class Exposure:
 
     async def _offer(self, interface: Interface) -> None:
         """Put up one interface; one that cannot be is told of once."""
+        base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
+        name = name_tool(base, taken=self._board.taken_names)
         try:
             if len(self._offered) >= MOST_EXPOSED:
-                raise LinkError(
-                    f"{MOST_EXPOSED} tools are exposed already.", hint="Name fewer of them."
-                )
+                said = f"{MOST_EXPOSED} tools are exposed already."
+                raise LinkError(said, hint="Name fewer of them.")
             self._check_policy(interface)
-            skill = await self._open(interface)
+            skill = await open_interface(interface, self._ros, name=name, reserved=RESERVED)
         except MapspeakError as error:
             self._left_out.add(interface)
             logger.warning("%s is not exposed: %s", interface.name, error)
             return
         self._board.put_up(skill)
-        self._offered[interface] = skill.spec.name
-
-    async def _open(self, interface: Interface) -> InterfaceSkill:
-        prefix = {InterfaceKind.PUBLISH: "publish_", InterfaceKind.READ: "read_"}
-        base = f"{prefix.get(interface.kind, '')}{interface.name.strip('/')}"
-        name = name_tool(base, taken=self._board.taken_names)
-        return await open_interface(interface, self._ros, name=name, reserved=RESERVED)
+        self._offered[interface] = name
 
     def _check_policy(self, interface: Interface) -> None:
         """Check that the policy does not deny an interface for its name.
@@ -127,52 +120,42 @@ class Exposure:
         Raises:
             PolicyError: It does: a tool that is always refused is not offered.
         """
-        command = _command_of(interface)
-        connection = self._ros.inquiry.connection
-        is_denied = (
-            command is not None
-            and isinstance(connection, GuardedConnection)
-            and connection.is_name_denied(command)
-        )
-        if is_denied:
+        connection, command = self._ros.inquiry.connection, interface.command
+        if command is None or not isinstance(connection, GuardedConnection):
+            return
+        if connection.is_name_denied(command):
             raise PolicyError("The policy denies it.", hint="A person can allow it in policy.yaml.")
 
     async def _find(self) -> list[Interface]:
         """Return the requested interfaces that the robot offers now."""
         connection = self._ros.inquiry.connection
         graph = await connection.fetch_graph()
-        services = await connection.fetch_services()
-        topics = _plain_topics(graph)
-        actions = [name for name in actions_of(graph) if self._is_wanted(name)]
-        found = [
-            *[each for name in actions for each in await self._ask(self._find_action, name)],
-            *[
-                each
-                for name in services
-                if self._is_wanted(name) and (name in self._patterns or not _is_everybodys(name))
-                for each in await self._ask(self._find_service, name)
-            ],
-            *[
-                each
-                for name, kind in topics.items()
-                if self._is_wanted(name)
-                for each in await self._ask(self._find_sides, name, kind)
-            ],
+        services = [
+            name
+            for name in await connection.fetch_services()
+            if name in self._patterns or not _is_everybodys(name)
         ]
-        here = {*actions, *services, *topics}
-        self._answers = {name: each for name, each in self._answers.items() if name in here}
-        return found
+        asked: dict[tuple[str, str], Find] = {
+            **{("action", name): self._find_action for name in actions_of(graph)},
+            **{("service", name): self._find_service for name in services},
+            **{("topic", name): partial(self._find_sides, kind) for name, kind in _topics(graph)},
+        }
+        self._answers = {key: each for key, each in self._answers.items() if key in asked}
+        return [
+            each
+            for key, find in asked.items()
+            if any(fnmatch.fnmatchcase(key[1], pattern) for pattern in self._patterns)
+            for each in await self._ask(key, find)
+        ]
 
-    async def _ask(
-        self, find: Callable[..., Awaitable[list[Interface]]], name: str, *more: str
-    ) -> list[Interface]:
-        """Return the answer for a name; reuse a recent one, or at an error the last one."""
-        known, asked_s = self._answers.get(name, ([], -math.inf))
+    async def _ask(self, key: tuple[str, str], find: Find) -> list[Interface]:
+        """Return what is found for a name; reuse a recent answer, or at an error the last one."""
+        known, asked_s = self._answers.get(key, ([], -math.inf))
         if anyio.current_time() < asked_s + KEPT_S:
             return known
         with suppress(LinkError):
-            known = await find(name, *more)
-        self._answers[name] = (known, anyio.current_time())
+            known = await find(key[1])
+        self._answers[key] = (known, anyio.current_time())
         return known
 
     async def _find_action(self, action: str) -> list[Interface]:
@@ -183,7 +166,7 @@ class Exposure:
         kind = await self._ros.inquiry.connection.fetch_service_type(service)
         return [Interface(InterfaceKind.SERVICE, service, bare_type(kind))]
 
-    async def _find_sides(self, topic: str, kind: str) -> list[Interface]:
+    async def _find_sides(self, kind: str, topic: str) -> list[Interface]:
         """Return whether a topic is read or published on, by its other ends."""
         connection = self._ros.inquiry.connection
         ends = {
@@ -192,9 +175,6 @@ class Exposure:
         }
         return [Interface(side, topic, bare_type(kind)) for side, end in ends.items() if end.others]
 
-    def _is_wanted(self, name: str) -> bool:
-        return any(fnmatch.fnmatchcase(name, pattern) for pattern in self._patterns)
-
 
 def _is_everybodys(service: str) -> bool:
     """Return True for services that every node has, and for rosapi's and those within actions."""
@@ -202,24 +182,9 @@ def _is_everybodys(service: str) -> bool:
     return "/_action/" in service or any(re.fullmatch(form, service) for form in forms)
 
 
-def _plain_topics(graph: RosGraph) -> Mapping[str, str]:
-    """Return the topics that are no part of an action."""
+def _topics(graph: RosGraph) -> Iterator[tuple[str, str]]:
+    """Yield the topics that are no part of an action, with their types."""
     parts = {f"{action}/{part}" for action in actions_of(graph) for part in PARTS_OF_ACTION}
-    return {
-        topic: kind
-        for topic, kind in sorted(graph.types.items())
-        if topic not in parts and "/_action/" not in topic
-    }
-
-
-def _command_of(interface: Interface) -> Act | Call | Publish | None:
-    name, kind = interface.name, interface.type
-    match interface.kind:
-        case InterfaceKind.ACTION:
-            return Act(action=name, type=kind, goal={}, true_type=kind)
-        case InterfaceKind.SERVICE:
-            return Call(service=name, type=kind, arguments={})
-        case InterfaceKind.PUBLISH:
-            return Publish(topic=name, type=kind, message={})
-        case InterfaceKind.READ:
-            return None
+    for topic, kind in sorted(graph.types.items()):
+        if topic not in parts and "/_action/" not in topic:
+            yield topic, kind

@@ -1,8 +1,7 @@
 """A topic, a service or an action of the robot as a skill, by the same door as the ROS tools."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import anyio
@@ -19,9 +18,11 @@ from mapspeak.server.tools.ros.measuring import check_frames
 from mapspeak.server.tools.ros.reading import hear
 from mapspeak.server.tools.ros.views import BULKY
 from mapspeak.skill import (
+    Arguments,
     JsonValue,
     OnProgress,
     ParameterKind,
+    Skill,
     SkillCode,
     SkillEffect,
     SkillOutcome,
@@ -29,9 +30,11 @@ from mapspeak.skill import (
     SkillProgress,
     SkillSpec,
     SkillState,
+    failed,
+    succeeded,
 )
 from mapspeak.skills.arguments import check_arguments
-from mapspeak.skills.layout import build_layout
+from mapspeak.skills.layout import MessageLayout, build_layout
 
 
 class InterfaceKind(StrEnum):
@@ -56,24 +59,30 @@ class Interface:
     name: str
     type: str
 
+    @property
+    def command(self) -> Act | Call | Publish | None:
+        """What the policy sees of its use; None for one that is only read."""
+        match self.kind:
+            case InterfaceKind.ACTION:
+                return Act(action=self.name, type=self.type, goal={}, true_type=self.type)
+            case InterfaceKind.SERVICE:
+                return Call(service=self.name, type=self.type, arguments={})
+            case InterfaceKind.PUBLISH:
+                return Publish(topic=self.name, type=self.type, message={})
+            case InterfaceKind.READ:
+                return None
 
-TIMEOUTS_S = {
-    InterfaceKind.SERVICE: 15.0,
-    InterfaceKind.ACTION: 600.0,
-    InterfaceKind.PUBLISH: 25.0,
-    InterfaceKind.READ: 10.0,
-}
-DOES = {
-    InterfaceKind.SERVICE: "calls",
-    InterfaceKind.ACTION: "sends a goal to",
-    InterfaceKind.PUBLISH: "publishes on",
-    InterfaceKind.READ: "reads",
-}
+    @property
+    def is_velocity(self) -> bool:
+        """True for a topic on which a robot goes on until it is told otherwise."""
+        return self.kind is InterfaceKind.PUBLISH and self.type in VELOCITIES
+
+
 LOOK_S = 0.2
 RATE_HZ = 10.0
 DURATION = SkillParameter(
-    name="for_s",
-    kind=ParameterKind.NUMBER,
+    "for_s",
+    ParameterKind.NUMBER,
     unit="s to go on; then the robot stands",
     least=0.1,
     most=20.0,
@@ -89,122 +98,43 @@ OUTCOMES = {
 }
 
 
-class InterfaceSkill(ABC):
-    """The common part of all skills of one interface.
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """An interface with its type, ready to be used.
 
-    Args:
-        interface: What it calls.
-        ros: The way to it.
-        described: Its type.
-        name: Of the skill.
-        reserved: Names that no argument may have.
+    Attributes:
+        sent: What it takes.
     """
 
-    def __init__(
-        self,
-        interface: Interface,
-        ros: RosAccess,
-        described: Described,
-        *,
-        name: str,
-        reserved: frozenset[str],
-    ) -> None:
-        self.interface = interface
-        self.ros = ros
-        self.described = described
-        reads = interface.kind is InterfaceKind.READ
-        self.sent = build_layout(described.book, described.parts[0], reserved=reserved)
-        parameters = () if reads else self.sent.parameters
-        if self.is_velocity:
-            parameters = (*parameters, DURATION)
-        self._spec = SkillSpec(
-            name=name,
-            description=f"{DOES[interface.kind]} {interface.name} ({interface.type})",
-            effect=SkillEffect.READS if reads else SkillEffect.MOVES,
-            timeout_s=TIMEOUTS_S[interface.kind],
-            parameters=parameters,
+    interface: Interface
+    ros: RosAccess
+    described: Described
+    sent: MessageLayout
+    spec: SkillSpec
+
+    async def call(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        """Call the service; an answer that reports its own failure is a failure."""
+        type_name = await self.ros.inquiry.said(self.interface.type, kind="srv")
+        self.ros.commands.check_name(
+            Call(service=self.interface.name, type=type_name, arguments={})
         )
-
-    @property
-    def spec(self) -> SkillSpec:
-        """Its description."""
-        return self._spec
-
-    @property
-    def is_velocity(self) -> bool:
-        """True for a topic on which a robot goes on until it is told otherwise."""
-        is_published = self.interface.kind is InterfaceKind.PUBLISH
-        return is_published and self.interface.type in VELOCITIES
-
-    @abstractmethod
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Do it once, and return how it ended."""
-
-    async def check(self, arguments: Mapping[str, JsonValue]) -> Message:
-        """Return the message that the arguments are, as its type wants it.
-
-        Raises:
-            LinkError: It does not fit, or names an unknown frame.
-            SkillError: An argument is unknown, or has a wrong value.
-        """
-        given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
-        given.pop(DURATION.name, None)
-        book, part = self.described.book, self.described.parts[0]
-        message = check_message(book, part, self.sent.build(given))
-        if self.interface.kind in (InterfaceKind.ACTION, InterfaceKind.PUBLISH):
-            await check_frames(self.ros.inquiry, message)
-        return message
-
-    def read(self, part: int, message: Message) -> dict[str, JsonValue]:
-        """Return the answer, named as arguments would be."""
-        try:
-            return build_layout(self.described.book, self.described.parts[part]).read(message)
-        except LinkError:
-            return {}
-
-
-class ServiceSkill(InterfaceSkill):
-    """Calls a service."""
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Call it; an answer that reports its own failure is a failure."""
-        del on_progress
-        name = self.interface.name
-        said = await self.ros.inquiry.said(self.interface.type, kind="srv")
-        self.ros.commands.check_name(Call(service=name, type=said, arguments={}))
-        request = await self.check(arguments)
+        request = await self._check(arguments)
         answer = await self.ros.inquiry.connection.call_service(
-            name, request, type_name=said, timeout_s=self.spec.timeout_s
+            self.interface.name, request, type_name=type_name, timeout_s=self.spec.timeout_s
         )
-        outputs = self.read(1, answer)
+        outputs = self._read(1, answer)
         if answer.get("success", True) is False:
-            return SkillOutcome(
-                state=SkillState.FAILED,
-                code=SkillCode.ABORTED,
-                outputs=outputs,
-                quote=str(answer.get("message", "")),
-            )
-        return SkillOutcome(state=SkillState.SUCCEEDED, outputs=outputs)
+            quote = str(answer.get("message", ""))
+            return replace(failed(SkillCode.ABORTED, quote), outputs=outputs)
+        return succeeded(**outputs)
 
-
-class ActionSkill(InterfaceSkill):
-    """Sends a goal to an action and follows it to its end."""
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Send it; a goal that is given up or takes too long is cancelled at its server."""
+    async def act(self, arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
+        """Send a goal and follow it; one that is given up or late is cancelled at its server."""
         n_stops = self.ros.inquiry.connection.started.n_stops
-        name = self.interface.name
-        self.ros.commands.check_name(Act(action=name, type=self.interface.type, goal={}))
-        goal = await self.check(arguments)
-        tracked = await self.ros.goals.send(
-            name, goal, type_name=self.interface.type, n_stops=n_stops
-        )
+        name, type_name = self.interface.name, self.interface.type
+        self.ros.commands.check_name(Act(action=name, type=type_name, goal={}))
+        goal = await self._check(arguments)
+        tracked = await self.ros.goals.send(name, goal, type_name=type_name, n_stops=n_stops)
         try:
             with anyio.move_on_after(self.spec.timeout_s):
                 await self._follow(tracked, on_progress)
@@ -212,77 +142,34 @@ class ActionSkill(InterfaceSkill):
             with anyio.CancelScope(shield=True):
                 await self._end(tracked)
             raise
-        if not tracked.goal.is_over:
-            quote = await self._end(tracked)
+        ended = tracked.goal
+        if not ended.is_over:
+            quote, numbers = await self._end(tracked), {"after_s": self.spec.timeout_s}
             return SkillOutcome(
-                state=SkillState.TIMED_OUT,
-                code=SkillCode.TOO_LATE,
-                numbers={"after_s": self.spec.timeout_s},
-                quote=quote,
+                SkillState.TIMED_OUT, SkillCode.TOO_LATE, numbers=numbers, quote=quote
             )
-        return self._outcome(tracked)
+        outputs = {} if ended.result is None else self._read(1, ended.result)
+        return SkillOutcome(*OUTCOMES[ended.state], outputs=outputs, quote=ended.reason)
 
-    async def _follow(self, tracked: TrackedGoal, on_progress: OnProgress) -> None:
-        n_told = 0
-        while not tracked.goal.is_over:
-            await self.ros.goals.wait(tracked, wait_s=LOOK_S)
-            feedback = tracked.goal.feedback
-            if feedback is not None and tracked.goal.n_feedback != n_told:
-                n_told = tracked.goal.n_feedback
-                on_progress(SkillProgress(values=self.read(2, feedback)))
-
-    async def _end(self, tracked: TrackedGoal) -> str:
-        """Cancel a goal, and return its server's objection."""
-        try:
-            await self.ros.goals.cancel(tracked)
-        except MapspeakError as error:
-            return error.message
-        return ""
-
-    def _outcome(self, tracked: TrackedGoal) -> SkillOutcome:
-        goal = tracked.goal
-        state, code = OUTCOMES[goal.state]
-        result = goal.result
-        return SkillOutcome(
-            state=state,
-            code=code,
-            outputs={} if result is None else self.read(1, result),
-            quote=goal.reason,
-        )
-
-
-class PublishSkill(InterfaceSkill):
-    """Publishes on a topic: a velocity for a time, anything else once."""
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Publish it; a velocity ends with a stand, also where it is given up."""
-        del on_progress
+    async def publish(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        """Publish once; a velocity for a time, then a stand, also where it is given up."""
         name, kind = self.interface.name, self.interface.type
         self.ros.commands.check_name(Publish(topic=name, type=kind, message={}))
-        message = await self.check(arguments)
-        is_moving = self.is_velocity and zero_velocity_of(message) != message
+        message = await self._check(arguments)
+        is_velocity = self.interface.is_velocity
         request = PublishRequest(
             topic=name,
             type=await self.ros.inquiry.said(kind),
             message=message,
-            is_moving=is_moving,
-            duration_s=float(arguments[DURATION.name]) if self.is_velocity else None,
+            is_moving=is_velocity and zero_velocity_of(message) != message,
+            duration_s=float(arguments[DURATION.name]) if is_velocity else None,
             rate_hz=RATE_HZ,
         )
         await self.ros.publisher.publish(request)
-        return SkillOutcome(state=SkillState.SUCCEEDED)
+        return succeeded()
 
-
-class ReadSkill(InterfaceSkill):
-    """Reads the latest message of a topic."""
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Wait for a message, where none has come yet."""
-        del on_progress
+    async def read(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        """Read the topic's latest message; wait for one, where none has come yet."""
         check_arguments((), arguments, skill=self.spec.name)
         heard = await hear(
             self.ros.inquiry.connection,
@@ -294,36 +181,95 @@ class ReadSkill(InterfaceSkill):
             duration_s=0.0,
         )
         if not heard.messages:
-            return SkillOutcome(state=SkillState.FAILED, code=SkillCode.NOT_ANSWERED)
-        return SkillOutcome(
-            state=SkillState.SUCCEEDED,
-            outputs=self.read(0, heard.messages[0]),
-            numbers={"age_s": round(heard.age_s, 1)},
-        )
+            return failed(SkillCode.NOT_ANSWERED)
+        outputs, age_s = self._read(0, heard.messages[0]), round(heard.age_s, 1)
+        return replace(succeeded(**outputs), numbers={"age_s": age_s})
+
+    async def _check(self, arguments: Arguments) -> Message:
+        """Return the message that the arguments are, as its type wants it.
+
+        Raises:
+            LinkError: It does not fit, or names an unknown frame.
+            SkillError: An argument is unknown, or has a wrong value.
+        """
+        given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
+        given.pop(DURATION.name, None)
+        book, part = self.described.book, self.described.parts[0]
+        message = check_message(book, part, self.sent.build(given))
+        if self.interface.kind is not InterfaceKind.SERVICE:
+            await check_frames(self.ros.inquiry, message)
+        return message
+
+    def _read(self, part: int, message: Message) -> dict[str, JsonValue]:
+        """Return an answer, named as arguments would be."""
+        try:
+            return build_layout(self.described.book, self.described.parts[part]).read(message)
+        except LinkError:
+            return {}
+
+    async def _follow(self, tracked: TrackedGoal, on_progress: OnProgress) -> None:
+        n_told = 0
+        while not tracked.goal.is_over:
+            await self.ros.goals.wait(tracked, wait_s=LOOK_S)
+            feedback = tracked.goal.feedback
+            if feedback is not None and tracked.goal.n_feedback != n_told:
+                n_told = tracked.goal.n_feedback
+                on_progress(SkillProgress(values=self._read(2, feedback)))
+
+    async def _end(self, tracked: TrackedGoal) -> str:
+        """Cancel a goal, and return its server's objection."""
+        try:
+            await self.ros.goals.cancel(tracked)
+        except MapspeakError as error:
+            return error.message
+        return ""
 
 
-SKILLS: Mapping[InterfaceKind, type[InterfaceSkill]] = {
-    InterfaceKind.SERVICE: ServiceSkill,
-    InterfaceKind.ACTION: ActionSkill,
-    InterfaceKind.PUBLISH: PublishSkill,
-    InterfaceKind.READ: ReadSkill,
-}
-KINDS = {
-    InterfaceKind.SERVICE: "srv",
-    InterfaceKind.ACTION: "action",
-    InterfaceKind.PUBLISH: "msg",
-    InterfaceKind.READ: "msg",
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """How interfaces of a kind are used."""
+
+    type_kind: str
+    does: str
+    timeout_s: float
+    run: Callable[[_Opened, Arguments, OnProgress], Awaitable[SkillOutcome]]
+
+
+WAYS = {
+    InterfaceKind.SERVICE: _Way("srv", "calls", 15.0, _Opened.call),
+    InterfaceKind.ACTION: _Way("action", "sends a goal to", 600.0, _Opened.act),
+    InterfaceKind.PUBLISH: _Way("msg", "publishes on", 25.0, _Opened.publish),
+    InterfaceKind.READ: _Way("msg", "reads", 10.0, _Opened.read),
 }
 
 
 async def open_interface(
     interface: Interface, ros: RosAccess, *, name: str, reserved: frozenset[str] = frozenset()
-) -> InterfaceSkill:
-    """Return the skill that an interface is.
+) -> Skill:
+    """Return an interface as a skill.
+
+    Args:
+        name: Of the skill.
+        reserved: Names that no argument may have.
 
     Raises:
         LinkError: Its type is not described, or cannot be.
     """
-    said = await ros.inquiry.said(interface.type, kind=KINDS[interface.kind])
-    described = await ros.inquiry.describe(said)
-    return SKILLS[interface.kind](interface, ros, described, name=name, reserved=reserved)
+    way, reads = WAYS[interface.kind], interface.kind is InterfaceKind.READ
+    type_name = await ros.inquiry.said(interface.type, kind=way.type_kind)
+    described = await ros.inquiry.describe(type_name)
+    sent = build_layout(described.book, described.parts[0], reserved=reserved)
+    parameters = () if reads else sent.parameters
+    spec = SkillSpec(
+        name,
+        f"{way.does} {interface.name} ({interface.type})",
+        SkillEffect.READS if reads else SkillEffect.MOVES,
+        timeout_s=way.timeout_s,
+        parameters=(*parameters, DURATION) if interface.is_velocity else parameters,
+    )
+    opened = _Opened(interface, ros, described, sent, spec)
+
+    async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
+        return await way.run(opened, arguments, on_progress)
+
+    return Skill(spec, run)

@@ -1,18 +1,20 @@
-"""Driving, looking and noting as skills: what missions do with the robot itself."""
+"""The skills that every mission has: driving, looking, noting, checking, waiting, asking."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.geometry import Pose
 from mapspeak.memory.episodes.observation import ObservationKind
 from mapspeak.places.views.sights import choose_view, is_there
 from mapspeak.robot import GoalState
+from mapspeak.safety import current_caller
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.session import Session
 from mapspeak.skill import (
-    JsonValue,
+    Arguments,
     OnProgress,
     ParameterKind,
+    Skill,
     SkillCode,
     SkillEffect,
     SkillOutcome,
@@ -20,52 +22,89 @@ from mapspeak.skill import (
     SkillProgress,
     SkillSpec,
     SkillState,
+    failed,
+    succeeded,
 )
-from mapspeak.skills.missions.questions import AskedPicture, QuestionBook
+from mapspeak.skills.conditions import CONDITIONS, Facts, find_unmet
+from mapspeak.skills.guarding import end_within
+from mapspeak.skills.questions import AskedPicture, QuestionBook
 
-LONGEST_DRIVE_S = 3600.0
 WAIT_S = 5.0
-PLACE = SkillParameter(
-    name="place",
-    kind=ParameterKind.TEXT,
-    description="an id, a remembered name, a phrase, or x, y",
-    most=200,
-    is_required=True,
-)
+CHECK_EVERY_S = 1.0
+HOUR_S, DAY_S = 3600.0, 86_400.0
+NUMBER, TEXT, LIST = ParameterKind.NUMBER, ParameterKind.TEXT, ParameterKind.LIST
+READS, MOVES = SkillEffect.READS, SkillEffect.MOVES
+WHERE = "an id, a remembered name, a phrase, or x, y"
+AHEAD = "ahead"
 DRIVE = SkillSpec(
-    name="drive",
-    description="Drives to a place",
-    effect=SkillEffect.MOVES,
-    timeout_s=LONGEST_DRIVE_S,
+    "drive",
+    "Drives to a place",
+    MOVES,
+    timeout_s=HOUR_S,
     parameters=(
-        PLACE,
-        SkillParameter(name="yaw_deg", kind=ParameterKind.NUMBER, unit="deg on arrival"),
+        SkillParameter("place", TEXT, description=WHERE, most=200, is_required=True),
+        SkillParameter("yaw_deg", NUMBER, unit="deg on arrival"),
     ),
 )
 LOOK = SkillSpec(
-    name="look",
-    description="Takes a picture: of a place from a clear view of it, or of what is ahead",
-    effect=SkillEffect.MOVES,
-    timeout_s=LONGEST_DRIVE_S,
+    "look",
+    "Takes a picture: of a place from a clear view of it, or of what is ahead",
+    MOVES,
+    timeout_s=HOUR_S,
     parameters=(
-        SkillParameter(
-            name="place",
-            kind=ParameterKind.TEXT,
-            description="ahead where left out",
-            most=200,
-            default="ahead",
-        ),
+        SkillParameter("place", TEXT, description="ahead where left out", most=200, default=AHEAD),
     ),
 )
 NOTE = SkillSpec(
-    name="note",
-    description="Notes an observation where the robot is",
-    effect=SkillEffect.READS,
+    "note",
+    "Notes an observation where the robot is",
+    READS,
     timeout_s=60.0,
-    parameters=(SkillParameter(name="text", kind=ParameterKind.TEXT, most=300, is_required=True),),
+    parameters=(SkillParameter("text", TEXT, most=300, is_required=True),),
+)
+CHECK = SkillSpec(
+    "check",
+    "Succeeds where all that is given holds now",
+    READS,
+    timeout_s=60.0,
+    parameters=CONDITIONS,
+)
+WITHIN = SkillParameter("within_s", NUMBER, unit="s", least=1, most=DAY_S, default=600.0)
+WAIT_FOR = SkillSpec(
+    "wait_for",
+    "Waits until all that is given holds",
+    READS,
+    timeout_s=DAY_S,
+    parameters=(*CONDITIONS, WITHIN),
+)
+WAIT = SkillSpec(
+    "wait",
+    "Waits",
+    READS,
+    timeout_s=DAY_S + 60,
+    parameters=(
+        SkillParameter("duration_s", NUMBER, unit="s", least=0, most=DAY_S, is_required=True),
+    ),
+)
+ANSWER = SkillParameter("", TEXT, most=80)
+ASK = SkillSpec(
+    "ask",
+    "Asks the model or the person who runs the mission, and waits for the answer",
+    READS,
+    timeout_s=DAY_S,
+    parameters=(
+        SkillParameter("question", TEXT, most=300, is_required=True),
+        SkillParameter(
+            "answers", LIST, description="any where left out", least=2, most=10, item=ANSWER
+        ),
+        SkillParameter(
+            "otherwise", TEXT, description="without an answer; else the step fails", most=300
+        ),
+        SkillParameter("within_s", NUMBER, unit="s", least=1, most=DAY_S, default=300.0),
+        SkillParameter("picture", TEXT, description="its id; the latest if left out", most=40),
+    ),
 )
 ENDS = {
-    GoalState.ARRIVED: (SkillState.SUCCEEDED, SkillCode.DONE),
     GoalState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
     GoalState.PREEMPTED: (SkillState.CANCELLED, SkillCode.STOPPED),
     GoalState.REJECTED: (SkillState.FAILED, SkillCode.REJECTED),
@@ -74,85 +113,84 @@ ENDS = {
 }
 
 
-class DriveSkill:
-    """Drives as the tools do: checked, guarded, one drive at a time."""
+class Leaves:
+    """Does what missions do with the robot itself.
 
-    spec = DRIVE
+    Args:
+        session: Whose robot it is.
+        facts: Of that session.
+        questions: Where its questions wait.
+    """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, facts: Facts, questions: QuestionBook) -> None:
         self._session = session
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Drive there; who is cancelled meanwhile leaves the robot standing.
-
-        Raises:
-            MapspeakError: There is no such place, or the robot may not drive there.
-        """
-        place, yaw_deg = arguments["place"], arguments.get("yaw_deg")
-        with self._session.drives.preparing() as ticket:
-            goal = await self._session.find_goal(place=place, x=None, y=None, yaw_deg=yaw_deg)
-            report = await drive_to(
-                self._session, goal.pose, goal.title, ticket=ticket, on_progress=on_progress
-            )
-        return end_of(report)
-
-
-class LookSkill:
-    """Drives to a clear view and takes a picture."""
-
-    spec = LOOK
-
-    def __init__(self, session: Session, questions: QuestionBook) -> None:
-        self._session = session
+        self._facts = facts
         self._questions = questions
 
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Look there, and give the picture's id and what the detector reports in it.
+    def list_skills(self) -> Iterator[Skill]:
+        """Yield each as a skill."""
+        yield Skill(DRIVE, self._drive)
+        yield Skill(LOOK, self._look)
+        yield Skill(NOTE, self._note)
+        yield Skill(CHECK, self._check)
+        yield Skill(WAIT_FOR, self._wait_for)
+        yield Skill(WAIT, self._wait)
+        yield Skill(ASK, self._ask)
 
-        Raises:
-            MapspeakError: There is no such place or no camera, or the robot may not drive there.
-        """
-        session, place = self._session, arguments["place"]
-        if place.casefold() != "ahead":
+    async def _drive(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
+        """Drive as the tools do: checked, guarded, one drive at a time."""
+        session = self._session
+        with session.drives.preparing() as ticket:
+            yaw_deg = given.get("yaw_deg")
+            goal = await session.find_goal(place=given["place"], x=None, y=None, yaw_deg=yaw_deg)
+            return await self._drive_to(goal.pose, goal.title, ticket, on_progress)
+
+    async def _look(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
+        """Drive to a clear view, and give the picture's id and what the detector reports in it."""
+        session, place = self._session, given["place"]
+        if place.casefold() != AHEAD:
             with session.drives.preparing() as ticket:
                 world = await session.fetch_world_model()
                 half_view_rad = session.pictures.half_view_rad
                 goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
                 here = (await session.robot.fetch_pose()).pose
                 if not is_there(here, goal.pose):
-                    report = await drive_to(
-                        session, goal.pose, goal.title, ticket=ticket, on_progress=on_progress
-                    )
-                    if report.status.state is not GoalState.ARRIVED:
-                        return end_of(report)
+                    outcome = await self._drive_to(goal.pose, goal.title, ticket, on_progress)
+                    if outcome.state is not SkillState.SUCCEEDED:
+                        return outcome
         sighting = await look_ahead(session)
         taken, picture = session.pictures.latest, sighting.picture
         picture_id = "" if taken is None else taken.id
         media = picture.media_type.partition("/")[2]
         self._questions.keep(AskedPicture(picture_id, picture.data, media))
         seen = ", ".join(each.label for each in sighting.detections)
-        outputs = {"picture": picture_id, "seen": seen}
-        return SkillOutcome(state=SkillState.SUCCEEDED, outputs=outputs)
+        return succeeded(picture=picture_id, seen=seen)
 
-
-class NoteSkill:
-    """Keeps an observation, which `recall_episodes` finds again."""
-
-    spec = NOTE
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-
-    async def run(
-        self, arguments: Mapping[str, JsonValue], on_progress: OnProgress
+    async def _drive_to(
+        self, goal: Pose, title: str, ticket: int, on_progress: OnProgress
     ) -> SkillOutcome:
-        """Note it with the time and the pose."""
-        del on_progress
-        session = self._session
+        """Drive to a checked goal; cancelled meanwhile, the robot is left standing."""
+        drives = self._session.drives
+        drive = await drives.start(goal, place=title, ticket=ticket)
+
+        async def tell(report: DriveReport) -> None:
+            left_m = report.status.distance_left_m
+            values = {} if left_m is None else {"left_m": round(left_m, 1)}
+            on_progress(SkillProgress(values=values))
+
+        while True:
+            report = await drives.wait(drive.goal_id, wait_s=WAIT_S, on_progress=tell)
+            if (status := report.status).state.is_final:
+                break
+        if status.state is GoalState.ARRIVED:
+            return succeeded(place=drive.place)
+        state, code = ENDS.get(status.state, (SkillState.FAILED, SkillCode.ABORTED))
+        quote = "" if status.cause is None else str(status.cause)
+        return SkillOutcome(state, code, outputs={"place": drive.place}, quote=quote)
+
+    async def _note(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        """Keep an observation with the time and the pose; `recall_episodes` finds it again."""
+        session, text = self._session, given["text"]
         pose = (await session.robot.fetch_pose()).pose
         room_id = await session.find_room_id(pose.point)
 
@@ -160,50 +198,46 @@ class NoteSkill:
             return session.episodes.keep(
                 ObservationKind.NOTE,
                 pose=pose,
-                text=arguments["text"],
+                text=text,
                 stamp_s=session.robot.now_s,
                 room_id=room_id,
                 name_map=session.memory.name_map,
             ).fault
 
         fault = await session.compute(keep)
-        state = SkillState.FAILED if fault else SkillState.SUCCEEDED
-        return SkillOutcome(
-            state=state,
-            code=SkillCode.LOST if fault else SkillCode.DONE,
-            outputs={"text": arguments["text"], "room": room_id or ""},
-            quote=fault,
+        return failed(SkillCode.LOST, fault) if fault else succeeded(text=text, room=room_id or "")
+
+    async def _check(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        return failed() if await find_unmet(given, self._facts) else succeeded()
+
+    async def _wait_for(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        until_s = self._facts.now_s + given["within_s"]
+        while await find_unmet(given, self._facts):
+            if self._facts.now_s >= until_s:
+                return failed()
+            await self._facts.sleep(CHECK_EVERY_S)
+        return succeeded()
+
+    async def _wait(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
+        await self._facts.sleep(given["duration_s"])
+        return succeeded()
+
+    async def _ask(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
+        """Ask, and fall back on the default where no answer comes in time."""
+        question = self._questions.put(
+            given["question"],
+            tuple(given.get("answers", ())),
+            picture=given.get("picture"),
+            client=current_caller().session,
         )
-
-
-async def drive_to(
-    session: Session, goal: Pose, title: str, *, ticket: int, on_progress: OnProgress
-) -> DriveReport:
-    """Drive to a checked goal and return how that ended.
-
-    Raises:
-        MapspeakError: The robot may not drive there, or was stopped meanwhile.
-    """
-    drive = await session.drives.start(goal, place=title, ticket=ticket)
-
-    async def tell(report: DriveReport) -> None:
-        left_m = report.status.distance_left_m
-        values = {} if left_m is None else {"left_m": round(left_m, 1)}
-        on_progress(SkillProgress(values=values))
-
-    while True:
-        report = await session.drives.wait(drive.goal_id, wait_s=WAIT_S, on_progress=tell)
-        if report.status.state.is_final:
-            return report
-
-
-def end_of(report: DriveReport) -> SkillOutcome:
-    """Return how a drive ended, as a skill's end."""
-    status = report.status
-    state, code = ENDS.get(status.state, (SkillState.FAILED, SkillCode.ABORTED))
-    return SkillOutcome(
-        state=state,
-        code=code,
-        outputs={"place": report.drive.place},
-        quote="" if status.cause is None else str(status.cause),
-    )
+        on_progress(SkillProgress(is_asking=True))
+        try:
+            await end_within(self._facts, given["within_s"], question.is_answered.wait)
+        finally:
+            self._questions.waiting.remove(question)
+            on_progress(SkillProgress())
+        if question.answer is not None:
+            return succeeded(answer=question.answer, by="answered")
+        if "otherwise" in given:
+            return succeeded(answer=given["otherwise"], by="nobody")
+        return failed(SkillCode.NOT_ANSWERED)

@@ -1,36 +1,36 @@
 """The tools of missions: run, answer, save, show, forget."""
 
-from collections.abc import Mapping
+import re
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context, Image
 from pydantic import Field, WithJsonSchema
 
 from mapspeak.errors import SkillError
-from mapspeak.memory.quoting import quote
-from mapspeak.server.text.missions import (
+from mapspeak.safety import current_caller
+from mapspeak.server.text.skills import (
     say_bounds,
     say_interrupted,
-    say_plan,
+    say_mission,
     say_question,
     say_skills,
 )
 from mapspeak.server.tools.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.reports import say_run
-from mapspeak.server.tools.skills.running import tell_news
+from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.skill import ParameterKind, SkillEffect, SkillParameter, SkillSpec
-from mapspeak.skills.missions.reading import parse_tree, read_tree
-from mapspeak.skills.missions.tree import MissionPlan
-from mapspeak.skills.owners.skillsfile import (
+from mapspeak.skill import JsonValue, ParameterKind, SkillSpec
+from mapspeak.skills.missiontree import Mission
+from mapspeak.skills.runs import SkillRuns
+from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
     NAME,
     USUAL_MISSION_MIN,
+    OwnersEntry,
     add_correction,
     write_mission,
 )
-from mapspeak.skills.runs import SkillRuns
+from mapspeak.skills.treereading import parse_tree
 
 MOST_ARGUMENTS = 20
 Tree = Annotated[
@@ -99,24 +99,15 @@ class MissionTools:
         """
         if (tree is None) == (name is None):
             raise SkillError("A mission is either a tree or a name.", hint="Give one of them.")
-        if tree is not None:
-            plan = MissionPlan(
-                spec=_spec("mission", within_min * 60, ()), tree=read_tree(parse_tree(tree))
-            )
-            given: Mapping[str, Any] = {}
+        if name is None:
+            written = {"name": "mission", "within_min": within_min, "mission": _read(tree)}
+            mission = self._book.open_mission(OwnersEntry.model_validate(written))
         else:
-            self._book.load_saved()
-            plan = self._find_saved(str(name))
-            given = read_values(plan.spec, values or [])
-        bounds = self._book.desk.check(plan)
-        run = await self._runs.begin(
-            self._book.plan(plan), given, client="", wait_s=wait_s, on_news=tell_news(context)
-        )
-        remember = [
-            f"Remember, as a person said: {quote(each, most=300)}." for each in plan.remember
-        ]
-        told = [*remember, say_bounds(bounds, plan.spec.timeout_s)]
-        return "\n".join([*told, say_run(run, self._book.questions)])
+            mission = self._find_saved(name)
+        given = read_values(mission.spec, values or [])
+        bounds = self._book.desk.check(mission)
+        run = await self._runs.begin(mission, given, wait_s=wait_s, on_news=tell_news(context))
+        return f"{say_bounds(mission, bounds)}\n{say_run(run, self._book.questions)}"
 
     @tool("Answer a mission", ToolEffect.REMEMBERS)
     async def answer_mission(
@@ -126,7 +117,7 @@ class MissionTools:
 
         Look at the picture before you answer; where you cannot tell, leave it to the fallback.
         """
-        found = self._book.questions.find(question)
+        found = self._book.questions.find(question, client=current_caller().session)
         if answer is not None:
             taken = self._book.questions.answer(found, answer)
             return [f"{found.id} is answered: {taken}."]
@@ -149,98 +140,78 @@ class MissionTools:
 
         Or keep a person's correction with a saved one: give name and correction.
         """
-        self._book.load_saved()
+        book = self._book
         if tree is None:
-            return self._correct(name, correction)
-        self._book.check_free(name)
-        written = parse_tree(tree)
-        wanted = [_read_parameter(each) for each in parameters or []]
-        plan = MissionPlan(
-            spec=_spec(name, within_min * 60, tuple(wanted)), tree=read_tree(written)
-        )
-        bounds = self._book.desk.check(plan)
-        entry: dict[str, Any] = {"name": name, "sentence": sentence}
-        if wanted:
-            entry["arguments"] = [_write_parameter(each) for each in wanted]
-        entry |= {"within_min": within_min, "mission": written}
-        kept = self._book.saved.get(name)
-        remember = [*(kept.plan.remember if kept else ()), *([correction] if correction else [])]
-        if remember:
-            entry["remember"] = remember
-        path = self._book.folder / f"{name}.yaml"
-        write_mission(path, entry)
-        self._book.load_saved()
-        return f"Saved {name} in {path}.\n{say_plan(self._find_saved(name), bounds)}"
+            path = self._find_saved(name).path
+            if not correction or path is None:
+                raise SkillError("Nothing is to be saved.", hint="Give a tree, or a correction.")
+            add_correction(path, name, correction)
+        else:
+            book.load_saved()
+            book.check_free(name)
+            kept = book.saved[name].remember if name in book.saved else ()
+            written = {
+                "name": name,
+                "sentence": sentence,
+                "arguments": [_read_parameter(each) for each in parameters or []],
+                "within_min": within_min,
+                "mission": _read(tree),
+                "remember": [*kept, *([correction] if correction else [])],
+            }
+            book.desk.check(book.open_mission(OwnersEntry.model_validate(written)))
+            path = book.folder / f"{name}.yaml"
+            write_mission(
+                path, {key: each for key, each in written.items() if each not in ("", [])}
+            )
+        return f"Saved {name} in {path}.\n{self._show(name)}"
 
     @tool("Show missions and skills", ToolEffect.READS)
     async def show_missions(self, name: SavedName = None) -> str:
         """List skills and saved missions, or show one mission as a tree with what it may do."""
-        self._book.load_saved()
         if name is not None:
-            plan = self._find_saved(name)
-            return say_plan(plan, self._book.desk.check(plan))
+            return self._show(name)
+        self._book.load_saved()
         told = [say_interrupted(self._book.interrupted), say_skills(self._book.skills.values())]
         return "\n".join(filter(None, told))
 
     @tool("Forget a mission", ToolEffect.REMEMBERS)
     async def forget_mission(self, name: Name) -> str:
         """Forget a saved mission; its file is kept beside as NAME.yaml.forgotten."""
+        path = self._find_saved(name).path
+        if path is not None:
+            path.replace(path.with_name(f"{path.name}.forgotten"))
         self._book.load_saved()
-        self._find_saved(name)
-        path = self._book.saved[name].path
-        path.replace(path.with_name(f"{path.name}.forgotten"))
-        self._book.load_saved()
-        return f"{name} is forgotten; its file is {path.name}.forgotten."
+        return f"{name} is forgotten; its file is kept as {path}.forgotten."
 
-    def _correct(self, name: str, correction: str | None) -> str:
-        if not correction:
-            raise SkillError("Nothing is to be saved.", hint="Give a tree, or a correction.")
-        self._find_saved(name)
-        add_correction(self._book.saved[name].path, name, correction)
+    def _find_saved(self, name: str) -> Mission:
         self._book.load_saved()
-        plan = self._find_saved(name)
-        return say_plan(plan, self._book.desk.check(plan))
-
-    def _find_saved(self, name: str) -> MissionPlan:
         if name not in self._book.saved:
             known = ", ".join(self._book.saved) or "none"
             raise SkillError(f"No mission is called {name[:60]!r}.", hint=f"Saved: {known}.")
-        return self._book.saved[name].plan
+        return self._book.saved[name]
+
+    def _show(self, name: str) -> str:
+        mission = self._find_saved(name)
+        return say_mission(mission, self._book.desk.check(mission))
 
 
-def _spec(name: str, timeout_s: float, parameters: tuple[SkillParameter, ...]) -> SkillSpec:
-    return SkillSpec(
-        name=name,
-        description="",
-        effect=SkillEffect.MOVES,
-        timeout_s=timeout_s,
-        parameters=parameters,
-    )
+def _read(tree: object) -> JsonValue:
+    return parse_tree(tree) or []
 
 
-def _read_parameter(said: str) -> SkillParameter:
-    """Return a parameter written as name or name=default."""
-    name, has_default, default = said.partition("=")
-    if not name.strip().isidentifier():
+def _read_parameter(said: str) -> dict[str, JsonValue]:
+    """Return a parameter written as name or name=default, as a file has it."""
+    name, has_default, default = (each.strip() for each in said.partition("="))
+    if not re.fullmatch(NAME, name):
         raise SkillError(f"{said[:60]!r} is no parameter.", hint="Write name, or name=default.")
-    return SkillParameter(
-        name=name.strip(),
-        kind=ParameterKind.TEXT,
-        most=200,
-        is_required=not has_default,
-        default=default.strip() if has_default else None,
-    )
+    written = {"name": name, "kind": "text", "most": 200.0}
+    return written | ({"default": default} if has_default else {})
 
 
-def _write_parameter(parameter: SkillParameter) -> dict[str, Any]:
-    written: dict[str, Any] = {"name": parameter.name, "kind": "text"}
-    return written | ({} if parameter.default is None else {"default": parameter.default})
-
-
-def read_values(spec: SkillSpec, values: list[str]) -> Mapping[str, Any]:
+def read_values(spec: SkillSpec, values: list[str]) -> dict[str, JsonValue]:
     """Return arguments written as name=value, as what their parameters hold."""
     kinds = {each.name: each.kind for each in spec.parameters}
-    given: dict[str, Any] = {}
+    given: dict[str, JsonValue] = {}
     for each in values:
         name, equals, value = each.partition("=")
         if not equals:

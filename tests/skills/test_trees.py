@@ -5,33 +5,24 @@ import json
 import pytest
 
 from mapspeak.errors import SkillError
-from mapspeak.server.text.missions import draw_plan, say_plan
+from mapspeak.server.text.skills import draw_mission, say_mission
 from mapspeak.skill import (
     JsonValue,
     ParameterKind,
     Skill,
-    SkillApproval,
     SkillEffect,
     SkillParameter,
 )
-from mapspeak.skills.missions.reading import parse_tree, read_tree
-from mapspeak.skills.missions.tree import (
+from mapspeak.skills.missiontree import (
+    Mission,
     MissionBounds,
-    MissionPlan,
+    MissionChecker,
     Step,
     StepKind,
-    check_plan,
     fill_in,
 )
+from mapspeak.skills.treereading import parse_tree, read_tree
 from skillmaking import FakeSkill, spec
-
-
-class FakeMission(FakeSkill):
-    """A skill that is a mission."""
-
-    def __init__(self, plan: MissionPlan) -> None:
-        super().__init__(plan.spec)
-        self.plan = plan
 
 
 def read(text: str) -> Step:
@@ -39,25 +30,25 @@ def read(text: str) -> Step:
 
 
 def text(name: str, *, is_required: bool = True) -> SkillParameter:
-    return SkillParameter(name=name, kind=ParameterKind.TEXT, is_required=is_required)
+    return SkillParameter(name, ParameterKind.TEXT, is_required=is_required)
 
 
-LEVEL = SkillParameter(name="level", kind=ParameterKind.NUMBER, least=0, most=3, default=1)
+LEVEL = SkillParameter("level", ParameterKind.NUMBER, least=0, most=3, default=1)
 SKILLS: dict[str, Skill] = {
     "drive": FakeSkill(spec("drive", parameters=(text("place"),))),
     "speak": FakeSkill(
         spec("speak", effect=SkillEffect.CHANGES, parameters=(text("words"), LEVEL))
     ),
-    "dock": FakeSkill(spec("dock", approval=SkillApproval.ALWAYS)),
+    "dock": FakeSkill(spec("dock", is_always_asked=True)),
     "check": FakeSkill(
         spec("check", effect=SkillEffect.READS, parameters=(text("sees", is_required=False),))
     ),
 }
 
 
-def plan(tree: str, *parameters: str, name: str = "mission") -> MissionPlan:
+def mission(tree: str, *parameters: str, name: str = "mission") -> Mission:
     given = spec(name, parameters=tuple(map(text, parameters)), timeout_s=600.0)
-    return MissionPlan(spec=given, tree=read(tree))
+    return Mission(given, FakeSkill(given).run, read(tree))
 
 
 def check(tree: str, *parameters: str, more: dict[str, Skill] | None = None) -> MissionBounds:
@@ -68,7 +59,7 @@ def check(tree: str, *parameters: str, more: dict[str, Skill] | None = None) -> 
             raise SkillError(f"There is no skill {name!r}.", hint="")
         return known[name]
 
-    return check_plan(plan(tree, *parameters), find, known)
+    return MissionChecker(find, lambda: known).check(mission(tree, *parameters))
 
 
 def test_a_list_is_a_sequence_and_a_word_a_skill_that_is_given_nothing() -> None:
@@ -144,8 +135,8 @@ def test_what_cannot_be_done_is_refused_before_anything_moves(written: str, faul
 
 
 def test_missions_that_hold_each_other_are_refused() -> None:
-    one = FakeMission(plan("- other", name="one"))
-    other = FakeMission(plan("- drive: R1\n- one", name="other"))
+    one = mission("- other", name="one")
+    other = mission("- drive: R1\n- one", name="other")
     with pytest.raises(SkillError, match="mission -> one -> other -> one"):
         check("- one", more={"one": one, "other": other})
 
@@ -168,7 +159,7 @@ def test_the_bounds_of_a_mission_are_its_worst_case() -> None:
 
 
 def test_a_mission_within_a_mission_counts_as_often_as_it_is_run() -> None:
-    inner = FakeMission(plan("- drive: '{room}'\n- speak: hello", "room", name="inner"))
+    inner = mission("- drive: '{room}'\n- speak: hello", "room", name="inner")
     bounds = check("repeat: 5\ndo:\n- inner: R1", more={"inner": inner})
     assert (bounds.n_drives, bounds.n_commands) == (5, 10)
 
@@ -195,10 +186,10 @@ def test_a_result_without_the_field_is_told_with_those_that_it_has() -> None:
 
 
 def test_a_mission_is_shown_as_a_tree_in_text_and_as_json() -> None:
-    shown = plan(
+    shown = mission(
         "- drive: '{room}'\n- fallback:\n  - check: {sees: cat}\n    as: cat\n  - dock\n", "room"
     )
-    said = say_plan(shown, MissionBounds(1, 2, frozenset({"dock"})))
+    said = say_mission(shown, MissionBounds(1, 2, frozenset({"dock"})))
     assert said.splitlines() == [
         "Mission mission.",
         "It takes room, a text.",
@@ -209,7 +200,7 @@ def test_a_mission_is_shown_as_a_tree_in_text_and_as_json() -> None:
         '   |- 4 check sees="cat" -> cat',
         "   `- 5 dock",
     ]
-    drawn = draw_plan(shown)
+    drawn = draw_mission(shown)
     assert drawn["tree"]["steps"][1]["steps"][1] == {
         "number": 5,
         "kind": "leaf",

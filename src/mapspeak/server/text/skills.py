@@ -1,19 +1,38 @@
-"""Missions in words: the tree, its bounds, its questions, what was interrupted."""
+"""Skills and missions in words: descriptions, conditions, trees, questions, interruptions."""
 
 from collections.abc import Iterable, Iterator
 
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
-from mapspeak.skill import JsonValue, Skill, SkillParameter
+from mapspeak.skill import Arguments, JsonValue, Skill, SkillCode, SkillEffect, SkillSpec
 from mapspeak.skills.arguments import say_wanted
-from mapspeak.skills.missions.questions import Question, QuestionBook
-from mapspeak.skills.missions.record import Interrupted
-from mapspeak.skills.missions.tree import MissionBounds, MissionPlan, Step, StepKind
+from mapspeak.skills.missionrecord import Interrupted
+from mapspeak.skills.missiontree import Mission, MissionBounds, Step, StepKind
+from mapspeak.skills.questions import Question, QuestionBook
 
+MOST_SENTENCE = 300
 MOST_WORDS = 80
 MOST_SKILLS = 100
 MOST_STEPS_TOLD = 20
+EFFECTS = {
+    SkillEffect.READS: "It only reads.",
+    SkillEffect.MOVES: "It may move the robot.",
+    SkillEffect.CHANGES: "It changes something at the robot.",
+}
+CODES = {
+    SkillCode.DONE: "",
+    SkillCode.CANCELLED: "It was cancelled before it was done.",
+    SkillCode.STOPPED: "The robot was stopped, or its server ended it, before it was done.",
+    SkillCode.TOO_LATE: "It had not ended in time and was ended.",
+    SkillCode.REJECTED: "The robot did not take it: check the arguments.",
+    SkillCode.ABORTED: "The robot gave up.",
+    SkillCode.LOST: "How it ended is not known: look at the robot, then run it again.",
+    SkillCode.NOT_ANSWERED: "Nothing came in time.",
+    SkillCode.PRECONDITION: "It was not begun.",
+    SkillCode.NOT_ACHIEVED: "It ended, but what counts as success did not hold.",
+}
+GOES_ON = "It goes on. {skill_status} waits for it. {cancel_skill} ends it."
 HEADS = {
     StepKind.SEQUENCE: "one after the other",
     StepKind.FALLBACK: "the first that succeeds of",
@@ -25,29 +44,55 @@ HEADS = {
 }
 
 
-def say_plan(plan: MissionPlan, bounds: MissionBounds) -> str:
+def describe_skill(spec: SkillSpec) -> str:
+    """Return the description of a skill for a model; its owner's words are quoted."""
+    said = f": {quote(spec.description, most=MOST_SENTENCE)}." if spec.description else "."
+    needs = f" It needs: {say_conditions(spec.needs)}." if spec.needs else ""
+    return f"Run the robot's skill {spec.name}{said} {EFFECTS[spec.effect]}{needs}"
+
+
+def say_conditions(conditions: Arguments) -> str:
+    """Return conditions in words."""
+    return "; ".join(_say_condition(name, value) for name, value in conditions.items())
+
+
+def _say_condition(name: str, value: JsonValue) -> str:
+    match name:
+        case "battery_above" | "battery_below":
+            return f"the battery {name.removeprefix('battery_')} {100 * value:.0f} %"
+        case "standing":
+            return "the robot standing" if value else "the robot driving"
+        case "in_room":
+            return f"the robot in {_say_value(value)}"
+        case "not" if isinstance(value, dict):
+            return f"not {say_conditions(value)}"
+    return f"{name.replace('_', ' ')} {_say_value(value)}"
+
+
+def say_mission(mission: Mission, bounds: MissionBounds) -> str:
     """Return a mission as a tree, with its parameters and what it may do at most."""
-    spec = plan.spec
-    said = f": {quote(spec.description, most=300)}" if spec.description else ""
+    spec = mission.spec
+    said = f": {quote(spec.description, most=MOST_SENTENCE)}" if spec.description else ""
     lines = [f"Mission {spec.name}{said}."]
-    lines += [f"It takes {_say_parameter(each)}." for each in spec.parameters]
-    lines += [f"Remember, as a person said: {quote(each, most=300)}." for each in plan.remember]
-    lines += [say_bounds(bounds, spec.timeout_s), *_draw(plan.tree, "", "")]
-    return "\n".join(lines)
+    for each in spec.parameters:
+        default = "" if each.default is None else f", {each.default!r} when left out"
+        lines.append(f"It takes {each.name}, {say_wanted(each)}{default}.")
+    return "\n".join([*lines, say_bounds(mission, bounds), *_draw(mission.tree, "", "")])
 
 
-def say_bounds(bounds: MissionBounds, timeout_s: float) -> str:
-    """Return what a mission may do at most."""
+def say_bounds(mission: Mission, bounds: MissionBounds) -> str:
+    """Return what people said about a mission, and what it may do at most."""
+    told = [
+        f"Remember, as a person said: {quote(each, most=MOST_SENTENCE)}."
+        for each in mission.remember
+    ]
     asked = f" A person is asked for {', '.join(sorted(bounds.asked))}." if bounds.asked else ""
-    return (
+    told.append(
         f"At most {say_count(bounds.n_drives, 'drive')} and "
-        f"{say_count(bounds.n_commands, 'other command')} within {timeout_s / 60:g} min.{asked}"
+        f"{say_count(bounds.n_commands, 'other command')} "
+        f"within {mission.spec.timeout_s / 60:g} min.{asked}"
     )
-
-
-def _say_parameter(parameter: SkillParameter) -> str:
-    default = "" if parameter.default is None else f", {parameter.default!r} when left out"
-    return f"{parameter.name}, {say_wanted(parameter)}{default}"
+    return "\n".join(told)
 
 
 def _draw(step: Step, indent: str, tail: str) -> Iterator[str]:
@@ -73,7 +118,7 @@ def _say_value(value: JsonValue) -> str:
     return quote(value, most=MOST_WORDS) if isinstance(value, str) else str(value)[:MOST_WORDS]
 
 
-def draw_plan(plan: MissionPlan) -> dict[str, JsonValue]:
+def draw_mission(mission: Mission) -> dict[str, JsonValue]:
     """Return a mission's tree as JSON, for a page that draws it."""
 
     def draw(step: Step) -> dict[str, JsonValue]:
@@ -84,14 +129,15 @@ def draw_plan(plan: MissionPlan) -> dict[str, JsonValue]:
             "steps": [draw(each) for each in step.steps],
         }
 
-    return {"name": plan.spec.name, "remember": list(plan.remember), "tree": draw(plan.tree)}
+    remember = list(mission.remember)
+    return {"name": mission.spec.name, "remember": remember, "tree": draw(mission.tree)}
 
 
 def say_question(question: Question) -> str:
     """Return a question with the answers that are taken."""
     taken = f" Answers: {', '.join(map(_say_value, question.answers))}." if question.answers else ""
     about = "" if question.picture is None else f" About picture {question.picture.id}."
-    return f"{question.id}: {quote(question.text, most=300)}.{taken}{about}"
+    return f"{question.id}: {quote(question.text, most=MOST_SENTENCE)}.{taken}{about}"
 
 
 def say_waiting(questions: QuestionBook) -> str:

@@ -5,19 +5,21 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 
 from mapspeak.errors import SkillError
 from mapspeak.skill import (
+    Arguments,
     JsonValue,
+    ParameterKind,
     Skill,
-    SkillApproval,
     SkillEffect,
     SkillParameter,
     SkillSpec,
     SkillState,
 )
 from mapspeak.skills.arguments import check_arguments
-from mapspeak.skills.comparing import plain
+from mapspeak.skills.conditions import plain
 
 MOST_DRIVES = 1000
 MOST_NESTED = 5
@@ -65,7 +67,7 @@ class Step:
     needs_all: bool = True
     skill: str = ""
     main: JsonValue = None
-    arguments: Mapping[str, JsonValue] = field(default_factory=dict)
+    arguments: Arguments = field(default_factory=dict)
     output: str = ""
 
     def walk(self) -> Iterator["Step"]:
@@ -87,41 +89,18 @@ class Step:
         return {spec.parameters[0].name: self.main, **self.arguments}
 
 
-@dataclass(frozen=True, slots=True)
-class MissionBounds:
-    """The bounds of a mission.
-
-    Attributes:
-        asked: The skills in it for which a person is asked each time.
-    """
-
-    n_drives: int = 0
-    n_commands: int = 0
-    asked: frozenset[str] = frozenset()
-
-    def __add__(self, other: "MissionBounds") -> "MissionBounds":
-        return MissionBounds(
-            self.n_drives + other.n_drives,
-            self.n_commands + other.n_commands,
-            self.asked | other.asked,
-        )
-
-    def times(self, n: int) -> "MissionBounds":
-        """Return the bounds of that many repetitions."""
-        return MissionBounds(self.n_drives * n, self.n_commands * n, self.asked)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MissionPlan:
-    """A mission before it is run.
+@dataclass(frozen=True, slots=True, eq=False)
+class Mission(Skill):
+    """A skill that is a tree of skills.
 
     Attributes:
         remember: Remarks of people about it since it was saved.
+        path: The file that it is saved in; None for one that is not.
     """
 
-    spec: SkillSpec
     tree: Step
     remember: tuple[str, ...] = ()
+    path: Path | None = None
 
 
 @dataclass(slots=True)
@@ -132,55 +111,81 @@ class MissionCourse:
         states: Of the leaves that have begun, by their numbers.
     """
 
-    plan: MissionPlan
-    given: Mapping[str, JsonValue]
+    mission: Mission
+    given: Arguments
     states: dict[int, SkillState] = field(default_factory=dict)
     is_over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MissionBounds:
+    """The bounds of a mission.
+
+    Attributes:
+        asked: The skills in it for which a person is asked each time.
+        parts: The missions within it, as they were when it was checked.
+    """
+
+    n_drives: int = 0
+    n_commands: int = 0
+    asked: frozenset[str] = frozenset()
+    parts: Mapping[str, Mission] = field(default_factory=dict, compare=False)
+
+    def __add__(self, other: "MissionBounds") -> "MissionBounds":
+        return MissionBounds(
+            self.n_drives + other.n_drives,
+            self.n_commands + other.n_commands,
+            self.asked | other.asked,
+            {**self.parts, **other.parts},
+        )
+
+    def times(self, n: int) -> "MissionBounds":
+        """Return the bounds of that many repetitions."""
+        return MissionBounds(self.n_drives * n, self.n_commands * n, self.asked, self.parts)
 
 
 FindSkill = Callable[[str], Skill]
 
 
-def check_plan(
-    plan: MissionPlan, find_skill: FindSkill, known: Iterable[str], *, above: tuple[str, ...] = ()
-) -> MissionBounds:
-    """Return what a mission can do at most.
+@dataclass(frozen=True, slots=True)
+class MissionChecker:
+    """Checks missions before anything moves.
 
-    Args:
+    Attributes:
         find_skill: Raises `SkillError` for a name that it does not know.
-        known: The names of all skills, for a hint at a misspelled one.
-        above: The missions that this one is within.
-
-    Raises:
-        SkillError: A part of it is unknown, not allowed, or does not fit.
+        list_skills: Names all skills, for a hint at a misspelled one.
     """
-    name = plan.spec.name
-    if name in above or len(above) >= MOST_NESTED:
-        way = " -> ".join((*above, name))
-        raise SkillError(f"The mission holds itself: {way}.", hint="Leave one of these steps out.")
-    checker = _Checker(find_skill, tuple(known), (*above, name))
-    bounds = checker.check(plan.tree, {each.name for each in plan.spec.parameters})
-    if bounds.n_drives > MOST_DRIVES:
-        raise SkillError(
-            f"The mission could drive {bounds.n_drives:,} times, the limit is {MOST_DRIVES:,}.",
-            hint="Repeat less often.",
-        )
-    return bounds
 
+    find_skill: FindSkill
+    list_skills: Callable[[], Iterable[str]]
 
-class _Checker:
-    def __init__(
-        self, find_skill: FindSkill, known: tuple[str, ...], above: tuple[str, ...]
-    ) -> None:
-        self._find_skill = find_skill
-        self._known = known
-        self._above = above
+    def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
+        """Return what a mission can do at most.
 
-    def check(self, step: Step, names: set[str]) -> MissionBounds:
+        Args:
+            above: The missions that this one is within.
+
+        Raises:
+            SkillError: A part of it is unknown, not allowed, or does not fit.
+        """
+        within = (*above, mission.spec.name)
+        if mission.spec.name in above or len(above) >= MOST_NESTED:
+            way = " -> ".join(within)
+            raise SkillError(f"The mission holds itself: {way}.", hint="Leave one step out.")
+        names = {each.name for each in mission.spec.parameters}
+        bounds = self._check(mission.tree, names, within)
+        if bounds.n_drives > MOST_DRIVES:
+            raise SkillError(
+                f"The mission could drive {bounds.n_drives:,} times, the limit is {MOST_DRIVES:,}.",
+                hint="Repeat less often.",
+            )
+        return bounds
+
+    def _check(self, step: Step, names: set[str], within: tuple[str, ...]) -> MissionBounds:
         """Check a step and the steps within; collect the names of its outputs."""
         if step.kind is StepKind.LEAF:
-            return self._check_leaf(step, names)
-        parts = [self.check(each, names) for each in step.steps]
+            return self._check_leaf(step, names, within)
+        parts = [self._check(each, names, within) for each in step.steps]
         if step.kind is StepKind.PARALLEL and sum(part.n_drives > 0 for part in parts) > 1:
             raise SkillError(
                 f"Step {step.number} drives to two places at once.",
@@ -188,53 +193,50 @@ class _Checker:
             )
         return sum(parts, MissionBounds()).times(step.times)
 
-    def _check_leaf(self, step: Step, names: set[str]) -> MissionBounds:
+    def _check_leaf(self, step: Step, names: set[str], within: tuple[str, ...]) -> MissionBounds:
         try:
-            skill = self._find_skill(step.skill)
+            skill = self.find_skill(step.skill)
         except SkillError as error:
-            near = difflib.get_close_matches(step.skill, self._known, n=1)
-            hint = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(self._known)}."
+            known = list(self.list_skills())
+            near = difflib.get_close_matches(step.skill, known, n=1)
+            hint = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(known)}."
             raise SkillError(f"Step {step.number}: {error.message}", hint=hint) from error
-        spec = skill.spec
+        spec, what = skill.spec, f"Step {step.number} ({step.skill})"
         given = step.name_arguments(spec)
         for name in sorted(find_names(given) - names):
             raise SkillError(
-                f"Step {step.number} ({step.skill}) uses {{{name}}}, which no step before gives.",
+                f"{what} uses {{{name}}}, which no step before gives.",
                 hint=f"There are: {', '.join(sorted(names)) or 'none'}. `as: {name}` gives it.",
             )
-        check_given(spec, given, what=f"Step {step.number} ({step.skill})")
+        _check_given(spec, given, what=what)
         if step.output:
             names.add(step.output)
-        if isinstance(plan := getattr(skill, "plan", None), MissionPlan):
-            return check_plan(plan, self._find_skill, self._known, above=self._above)
-        asked = spec.approval is SkillApproval.ALWAYS
-        n_commands = 0 if spec.effect is SkillEffect.READS or step.skill in DRIVING else 2
-        return MissionBounds(
-            n_drives=int(step.skill in DRIVING),
-            n_commands=max(n_commands, 2 * asked),
-            asked=frozenset({step.skill} if asked else ()),
-        )
+        if isinstance(skill, Mission):
+            inner = self.check(skill, within)
+            return inner + MissionBounds(parts={spec.name: skill})
+        drives, asks = step.skill in DRIVING, spec.is_always_asked
+        is_free = (spec.effect is SkillEffect.READS or drives) and not asks
+        asked = frozenset({step.skill} if asks else ())
+        return MissionBounds(int(drives), 0 if is_free else 2, asked)
 
 
-def check_given(spec: SkillSpec, given: Mapping[str, JsonValue], *, what: str) -> None:
-    """Return when arguments fit as far as they are known before the mission runs.
+def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
+    """Check arguments as far as they are known before the mission runs.
 
     Raises:
-        SkillError: They do not.
+        SkillError: They do not fit.
     """
     later = {name for name, value in given.items() if find_names(value)}
     now = {name: value for name, value in given.items() if name not in later}
-    stand_ins = tuple(each for each in spec.parameters if each.name not in later)
-    check_arguments(stand_ins, fit_kinds(stand_ins, now), skill=what)
+    known_now = tuple(each for each in spec.parameters if each.name not in later)
+    check_arguments(known_now, fit_kinds(known_now, now), skill=what)
     if strangers := later - {each.name for each in spec.parameters}:
         check_arguments(spec.parameters, dict.fromkeys(strangers), skill=what)
 
 
-def fit_kinds(
-    parameters: Iterable[SkillParameter], given: Mapping[str, JsonValue]
-) -> dict[str, JsonValue]:
+def fit_kinds(parameters: Iterable[SkillParameter], given: Arguments) -> dict[str, JsonValue]:
     """Return arguments with numbers written as text where their parameters are texts."""
-    texts = {each.name for each in parameters if each.kind == "text"}
+    texts = {each.name for each in parameters if each.kind is ParameterKind.TEXT}
     return {
         name: plain(value) if name in texts and isinstance(value, int | float) else value
         for name, value in given.items()
@@ -247,13 +249,13 @@ def find_names(value: JsonValue) -> set[str]:
         case str():
             return {match[1] for match in TEMPLATE.finditer(value)}
         case Mapping():
-            return {name for each in value.values() for name in find_names(each)}
+            return find_names(list(value.values()))
         case list() | tuple():
             return {name for each in value for name in find_names(each)}
     return set()
 
 
-def fill_in(value: JsonValue, values: Mapping[str, JsonValue]) -> JsonValue:
+def fill_in(value: JsonValue, values: Arguments) -> JsonValue:
     """Return a value with what its texts name; a text that is one name alone becomes that value.
 
     Raises:
@@ -272,7 +274,7 @@ def fill_in(value: JsonValue, values: Mapping[str, JsonValue]) -> JsonValue:
     return value
 
 
-def _look_up(match: re.Match[str], values: Mapping[str, JsonValue]) -> JsonValue:
+def _look_up(match: re.Match[str], values: Arguments) -> JsonValue:
     found, part = values.get(match[1]), match[2]
     if not isinstance(found, Mapping):
         if found is None or part is not None:

@@ -1,9 +1,10 @@
 """skills.yaml, in which the owner declares a robot's skills; saved missions are such files too."""
 
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -14,19 +15,21 @@ from ruamel.yaml.error import YAMLError
 from mapspeak.errors import ConfigError, SkillError, say_cause
 from mapspeak.settings import read_settings
 from mapspeak.skill import (
-    JsonValue,
+    Arguments,
+    OnProgress,
     ParameterKind,
-    Precondition,
-    PreconditionKind,
-    SkillApproval,
+    Skill,
     SkillEffect,
+    SkillOutcome,
     SkillParameter,
     SkillSpec,
+    SkillState,
+    failed,
 )
-from mapspeak.skills.arguments import check_value
-from mapspeak.skills.comparing import Comparison
-from mapspeak.skills.missions.reading import read_tree
-from mapspeak.skills.missions.tree import Step
+from mapspeak.skills.arguments import check_arguments, check_value
+from mapspeak.skills.conditions import OF_FACTS, is_as_wanted
+from mapspeak.skills.missiontree import Step
+from mapspeak.skills.treereading import read_tree
 
 NAME = r"^[a-z][a-z0-9_]{0,39}$"
 READY_MADE = ("nav2", "move_base")
@@ -47,39 +50,12 @@ class Called(StrEnum):
     MISSION = "mission"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OwnersEntry:
-    """One skill as its owner wrote it.
-
-    Attributes:
-        calls: The kind of thing it calls.
-        target: Its name at the robot; empty for a mission.
-        type: Given by the owner, where the robot does not tell it; else empty.
-        fixed: Arguments of what it calls that are always the same.
-        renamed: The called interface's argument for each of its own parameters.
-        success: Conditions on the result; None where the robot's own report decides.
-        judge: The skill whose result is looked at in place of its own; else empty.
-        remember: Remarks of people about it since.
-        tree: Of a mission.
-    """
-
-    spec: SkillSpec
-    calls: Called
-    target: str = ""
-    type: str = ""
-    fixed: Mapping[str, JsonValue]
-    renamed: Mapping[str, str]
-    success: Comparison | None = None
-    judge: str = ""
-    remember: tuple[str, ...] = ()
-    tree: Step | None = None
-
-
 _Name = Annotated[str, Field(pattern=NAME)]
 _Words = Annotated[str, Field(max_length=300)]
 _Target = Annotated[str, Field(min_length=1, max_length=200)]
 _Plain = str | float | int | bool
 _Kind = Literal["number", "whole", "text", "flag", "list"]
+_EFFECTS = {Called.READ: SkillEffect.READS, Called.MISSION: SkillEffect.MOVES}
 
 
 class _Written(BaseModel):
@@ -112,8 +88,8 @@ class _Argument(_Written):
 
     def parameter(self) -> SkillParameter:
         return SkillParameter(
-            name=self.name,
-            kind=ParameterKind(self.kind) if self.kind else self._guess(),
+            self.name,
+            ParameterKind(self.kind) if self.kind else self._guess(),
             description=self.about,
             unit=self.unit,
             least=self.least,
@@ -137,22 +113,6 @@ class _Argument(_Written):
         return ParameterKind.NUMBER if is_number else ParameterKind.TEXT
 
 
-class _Needs(_Written):
-    battery_above: Annotated[float, Field(ge=0, le=1)] | None = None
-    standing: Literal[True] | None = None
-    in_room: _Target | None = None
-
-    def preconditions(self) -> tuple[Precondition, ...]:
-        found = []
-        if self.battery_above is not None:
-            found.append(Precondition(PreconditionKind.BATTERY_ABOVE, ratio=self.battery_above))
-        if self.standing:
-            found.append(Precondition(PreconditionKind.STANDING))
-        if self.in_room is not None:
-            found.append(Precondition(PreconditionKind.IN_ROOM, room=self.in_room))
-        return tuple(found)
-
-
 class _Success(_Written):
     field: _Target
     by: _Name | None = None
@@ -167,8 +127,21 @@ class _Success(_Written):
             raise ValueError(message)
         return self
 
+    def holds_in(self, result: Arguments) -> bool:
+        wanted = {"is": self.equals, "above": self.above, "below": self.below}
+        return self.field in result and is_as_wanted(result[self.field], wanted)
 
-class _Skill(_Written):
+
+class OwnersEntry(_Written):
+    """One skill as its owner wrote it.
+
+    Attributes:
+        type: Given by the owner, where the robot does not tell it.
+        fixed: Arguments of what it calls that are always the same.
+        succeeded_when: Conditions on the result; None where the robot's own report decides.
+        remember: Remarks of people about it since.
+    """
+
     name: _Name
     sentence: _Words = ""
     service: _Target | None = None
@@ -183,56 +156,90 @@ class _Skill(_Written):
     succeeded_when: _Success | None = None
     timeout_s: Annotated[float, Field(gt=0, le=86_400)] = USUAL_TIMEOUT_S
     within_min: Annotated[float, Field(gt=0, le=MOST_MISSION_MIN)] = USUAL_MISSION_MIN
-    needs: _Needs = _Needs()
+    needs: dict[str, Any] = {}
     effect: Literal["reads", "moves", "changes"] | None = None
     approval: Literal["as_policy", "always"] = "as_policy"
     remember: list[_Words] = []
 
     @model_validator(mode="after")
     def _calls_one_thing(self) -> Self:
-        named = [each for each in Called if getattr(self, each) is not None]
-        if len(named) != 1:
+        if sum(getattr(self, each) is not None for each in Called) != 1:
             message = f"{self.name!r} needs one of: {', '.join(Called)}"
             raise ValueError(message)
         names = [each.name for each in self.arguments]
         if len(set(names)) != len(names):
             message = f"{self.name!r} has two arguments of one name"
             raise ValueError(message)
+        try:
+            check_arguments(OF_FACTS, self.needs, skill="needs")
+        except SkillError as error:
+            raise ValueError(str(error)) from error
         return self
 
-    def entry(self) -> OwnersEntry:
-        calls = next(each for each in Called if getattr(self, each) is not None)
-        is_mission = calls is Called.MISSION
-        usual = {Called.READ: SkillEffect.READS, Called.MISSION: SkillEffect.MOVES}
-        success = self.succeeded_when
-        return OwnersEntry(
-            spec=SkillSpec(
-                name=self.name,
-                description=self.sentence,
-                effect=SkillEffect(self.effect)
-                if self.effect
-                else usual.get(calls, SkillEffect.CHANGES),
-                timeout_s=self.within_min * 60 if is_mission else self.timeout_s,
-                parameters=tuple(each.parameter() for each in self.arguments),
-                preconditions=self.needs.preconditions(),
-                approval=SkillApproval(self.approval),
-            ),
-            calls=calls,
-            target="" if is_mission else str(getattr(self, calls)),
-            type=self.type or "",
-            fixed=dict(self.fixed),
-            renamed={each.name: each.sets or each.name for each in self.arguments},
-            success=None
-            if success is None
-            else Comparison(success.field, success.equals, success.above, success.below),
-            judge="" if success is None else success.by or "",
-            remember=tuple(self.remember),
-            tree=read_tree(self.mission) if is_mission else None,
+    @property
+    def calls(self) -> Called:
+        """The kind of thing it calls."""
+        return next(each for each in Called if getattr(self, each) is not None)
+
+    @property
+    def target(self) -> str:
+        """The name of what it calls at the robot; empty for a mission."""
+        return "" if self.calls is Called.MISSION else str(getattr(self, self.calls))
+
+    @property
+    def sets(self) -> dict[str, str]:
+        """The called interface's argument for each of its own."""
+        return {each.name: each.sets or each.name for each in self.arguments}
+
+    @cached_property
+    def spec(self) -> SkillSpec:
+        """Its description as a skill."""
+        effect = self.effect or _EFFECTS.get(self.calls, SkillEffect.CHANGES)
+        return SkillSpec(
+            self.name,
+            self.sentence,
+            SkillEffect(effect),
+            timeout_s=self.within_min * 60 if self.mission is not None else self.timeout_s,
+            parameters=tuple(each.parameter() for each in self.arguments),
+            needs=self.needs,
+            is_always_asked=self.approval == "always",
         )
+
+    @cached_property
+    def tree(self) -> Step:
+        """The steps of a mission.
+
+        Raises:
+            SkillError: They have a mistake.
+        """
+        return read_tree(self.mission)
+
+    async def run(
+        self,
+        open_called: Callable[[], Awaitable[Skill]],
+        find_skill: Callable[[str], Skill],
+        arguments: Arguments,
+        on_progress: OnProgress,
+    ) -> SkillOutcome:
+        """Call what it names, and say that it has failed where the owner's condition does not hold.
+
+        Raises:
+            MapspeakError: The robot does not offer it, or an argument does not fit there.
+        """
+        called, sets = await open_called(), self.sets
+        named = {sets[name]: value for name, value in arguments.items()}
+        outcome = await called.run({**self.fixed, **named}, on_progress)
+        success = self.succeeded_when
+        if success is None or outcome.state is not SkillState.SUCCEEDED:
+            return outcome
+        result = outcome.outputs
+        if success.by:
+            result = (await find_skill(success.by).run({}, lambda _: None)).outputs
+        return outcome if success.holds_in(result) else replace(failed(), outputs=outcome.outputs)
 
 
 class _SkillsFile(_Written):
-    skills: Annotated[list[_Skill], Field(max_length=200)] = []
+    skills: Annotated[list[OwnersEntry], Field(max_length=200)] = []
 
 
 def load_skills(path: Path) -> tuple[OwnersEntry, ...]:
@@ -243,23 +250,23 @@ def load_skills(path: Path) -> tuple[OwnersEntry, ...]:
     """
     if str(path) in READY_MADE and not path.exists():
         path = Path(__file__).with_name("data") / f"{path}.yaml"
-    read = read_settings(path, _SkillsFile, name="skills.yaml", advice=ADVICE)
-    entries = []
-    for each in read.skills:
-        try:
-            entries.append(each.entry())
-        except SkillError as error:
+    entries = read_settings(path, _SkillsFile, name="skills.yaml", advice=ADVICE).skills
+    names: set[str] = set()
+    for each in entries:
+        if each.name in names:
             raise ConfigError(
-                f"{path}, skill {each.name}: {error.message}", hint=error.hint
-            ) from error
-    names = [each.spec.name for each in entries]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise ConfigError(f"{path}: two skills are called {twice}.", hint="Rename one of them.")
+                f"{path}: two skills are called {each.name}.", hint="Rename one of them."
+            )
+        names.add(each.name)
+        try:
+            _ = each.mission is None or each.tree
+        except SkillError as error:
+            said = f"{path}, skill {each.name}: {error.message}"
+            raise ConfigError(said, hint=error.hint) from error
     return tuple(entries)
 
 
-def write_mission(path: Path, written: Mapping[str, Any]) -> None:
+def write_mission(path: Path, written: Arguments) -> None:
     """Write a file with one mission, as its owner would have.
 
     Raises:

@@ -8,16 +8,19 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import SkillError
-from mapspeak.skills.missions.tree import Step, StepKind
+from mapspeak.skill import JsonValue
+from mapspeak.skills.missiontree import Step, StepKind
 
 MOST_STEPS = 300
 DEEPEST = 16
 MOST_TIMES = 1000
+MOST_S = 86_400
 MOST_TEXT = 30_000
 MOST_NAME = 40
-MANY = (StepKind.SEQUENCE, StepKind.FALLBACK, StepKind.PARALLEL)
 CONTROL = frozenset(StepKind) - {StepKind.LEAF}
 OPTIONS: Mapping[StepKind, frozenset[str]] = {
+    StepKind.SEQUENCE: frozenset(),
+    StepKind.FALLBACK: frozenset(),
     StepKind.PARALLEL: frozenset({"needs"}),
     StepKind.RETRY: frozenset({"do"}),
     StepKind.TIMEOUT: frozenset({"do"}),
@@ -55,103 +58,84 @@ def read_tree(written: object) -> Step:
     Raises:
         SkillError: It has a mistake; says the line where that is known.
     """
-    return _Reader().read(written, ())
+    return _Reader().read(written, 0)
 
 
 class _Reader:
     def __init__(self) -> None:
         self._n_steps = 0
 
-    def read(self, written: object, above: tuple[int, ...]) -> Step:
+    def read(self, written: object, depth: int) -> Step:
         """Read one step; a list is a sequence, a word a skill that is given nothing."""
         self._n_steps += 1
         number = self._n_steps
-        if self._n_steps > MOST_STEPS:
+        if number > MOST_STEPS:
             raise _fault(written, f"the mission has more than {MOST_STEPS} steps")
-        if id(written) in above:
-            raise _fault(written, "the mission holds itself")
-        if len(above) > DEEPEST:
-            raise _fault(written, f"the mission is more than {DEEPEST} steps deep")
-        within = (*above, id(written))
+        if depth > DEEPEST:
+            raise _fault(written, f"the mission is more than {DEEPEST} steps deep, or holds itself")
         if isinstance(written, str):
             return Step(kind=StepKind.LEAF, number=number, skill=_name(written, written))
         if isinstance(written, list):
-            return self._many(StepKind.SEQUENCE, written, written, number, within)
+            return self._many(StepKind.SEQUENCE, written, written, number, depth)
         if not isinstance(written, Mapping) or not written:
-            raise _fault(written, f"{_shown(written)} is no step")
-        control = [StepKind(key) for key in written if key in CONTROL]
-        if not control:
+            shown = "an empty step" if isinstance(written, Mapping) else _shown(written)
+            raise _fault(written, f"{shown} is no step")
+        kind = next((StepKind(key) for key in written if key in CONTROL), None)
+        if kind is None:
             return _leaf(written, number)
-        kind = control[0]
-        strangers = [
-            str(key) for key in written if key != kind and key not in OPTIONS.get(kind, ())
-        ]
-        if strangers:
+        if strangers := [str(key) for key in written if key not in (kind, *OPTIONS[kind])]:
             raise _fault(written, f"{strangers[0][:MOST_NAME]!r} does not belong to {kind}")
-        if kind in MANY:
-            return self._many(kind, written[kind], written, number, within)
-        return self._one(kind, written, number, within)
+        if "do" in OPTIONS[kind]:
+            return self._one(kind, written, number, depth)
+        return self._many(kind, written[kind], written, number, depth)
 
     def _many(
-        self, kind: StepKind, steps: object, written: object, number: int, within: tuple[int, ...]
+        self, kind: StepKind, steps: object, written: object, number: int, depth: int
     ) -> Step:
         if not isinstance(steps, list) or not steps:
             raise _fault(written, f"{kind} needs a list of steps")
         needs = written.get("needs", "all") if isinstance(written, Mapping) else "all"
         if needs not in ("all", "one"):
             raise _fault(written, "needs is all or one")
-        # The list may be the way in which a step holds itself, not the step.
-        if id(steps) in within[:-1] or (steps is not written and id(steps) in within):
-            raise _fault(written, "the mission holds itself")
-        inside = (*within, id(steps))
-        read = tuple(self.read(each, inside) for each in steps)
+        read = tuple(self.read(each, depth + 1) for each in steps)
         return Step(kind=kind, number=number, steps=read, needs_all=needs == "all")
 
-    def _one(
-        self, kind: StepKind, written: Mapping[str, Any], number: int, within: tuple[int, ...]
-    ) -> Step:
+    def _one(self, kind: StepKind, written: Mapping[str, Any], number: int, depth: int) -> Step:
         if "do" not in written:
             raise _fault(written, f"{kind} needs `do`, the step that it is about")
-        inner = self.read(written["do"], within)
-        if kind is StepKind.UNTIL:
-            condition = self.read({"check": written[kind]}, within)
-            times = _number(written, "times", most=MOST_TIMES, default=10)
-            return Step(kind=kind, number=number, steps=(inner, condition), times=int(times))
-        if kind in (StepKind.RETRY, StepKind.REPEAT):
-            times = _number(written, kind, most=MOST_TIMES)
-            return Step(kind=kind, number=number, steps=(inner,), times=int(times))
-        limit = _number(written, kind, most=86_400)
-        times = _number(written, "times", most=MOST_TIMES, default=24)
-        is_every = kind is StepKind.EVERY
-        return Step(
-            kind=kind,
-            number=number,
-            steps=(inner,),
-            limit=limit,
-            times=int(times) if is_every else 1,
-        )
+        steps: tuple[Step, ...] = (self.read(written["do"], depth + 1),)
+        limit, times = 0.0, 1.0
+        match kind:
+            case StepKind.TIMEOUT:
+                limit = _number(written, kind, most=MOST_S)
+            case StepKind.EVERY:
+                limit = _number(written, kind, most=MOST_S)
+                times = _number(written, "times", most=MOST_TIMES, default=24)
+            case StepKind.UNTIL:
+                steps = (*steps, self.read({"check": written[kind]}, depth + 1))
+                times = _number(written, "times", most=MOST_TIMES, default=10)
+            case _:
+                times = _number(written, kind, most=MOST_TIMES)
+        return Step(kind=kind, number=number, steps=steps, limit=limit, times=int(times))
 
 
 def _leaf(written: Mapping[str, Any], number: int) -> Step:
     first, *others = written
-    skill, given = _name(first, written), written[first]
-    output = written.get("as", "")
-    if output:
-        output = _name(output, written)
-    named = {str(key): written[key] for key in others if key != "as"}
+    given, output = _plain(written[first]), written.get("as", "")
+    named = {str(key): _plain(written[key]) for key in others if key != "as"}
     if isinstance(given, Mapping):
-        named, given = {**{str(key): each for key, each in given.items()}, **named}, None
+        named, given = {**given, **named}, None
     return Step(
         kind=StepKind.LEAF,
         number=number,
-        skill=skill,
-        main=None if given is None else _plain(given),
-        arguments={name: _plain(each) for name, each in named.items()},
-        output=output,
+        skill=_name(first, written),
+        main=given,
+        arguments=named,
+        output=_name(output, written) if output else "",
     )
 
 
-def _plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - YAML
+def _plain(value: object, depth: int = 0) -> JsonValue:
     """Return a value of YAML without what its reader adds.
 
     Raises:
@@ -172,10 +156,9 @@ def _plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - YAML
 
 
 def _name(name: object, written: object) -> str:
-    is_name = isinstance(name, str) and name.isidentifier() and len(name) <= 2 * MOST_NAME
-    if not is_name:
+    if not isinstance(name, str) or not name.isidentifier() or len(name) > 2 * MOST_NAME:
         raise _fault(written, f"{_shown(name)} is no name of a skill or a result")
-    return str(name)
+    return name
 
 
 def _number(
@@ -195,6 +178,4 @@ def _fault(written: object, what: str) -> SkillError:
 
 
 def _shown(value: object) -> str:
-    if isinstance(value, Mapping | list):
-        return "a list" if isinstance(value, list) else "an empty step"
-    return repr(value)[:MOST_NAME]
+    return "a list" if isinstance(value, Mapping | list) else repr(value)[:MOST_NAME]

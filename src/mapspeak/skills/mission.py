@@ -1,0 +1,177 @@
+"""A mission as a skill: one approval for all of it, one at a time, with its record."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from contextvars import ContextVar
+from functools import partial
+from pathlib import Path
+
+from mapspeak.errors import SkillError
+from mapspeak.safety import ApprovalScope, CommandKind, RunSkill, within_scope
+from mapspeak.skill import Arguments, JsonValue, OnProgress, Skill, SkillOutcome, SkillSpec
+from mapspeak.skills.arguments import check_arguments
+from mapspeak.skills.conditions import plain
+from mapspeak.skills.guarding import SkillGate
+from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.missiontree import (
+    Mission,
+    MissionBounds,
+    MissionChecker,
+    MissionCourse,
+    Step,
+)
+
+MOST_TOLD = 160
+"""Letters of the steps that a person is asked about; the tree has them all."""
+# State of a task, not of the module: within a mission, the missions in it as they were approved.
+_PARTS: ContextVar[Mapping[str, Mission] | None] = ContextVar("parts", default=None)
+
+
+class MissionDesk:
+    """Runs the missions of one server.
+
+    Args:
+        checker: Knows the skills.
+        gate: Lets a mission begin, and ends it in time.
+        record: On disk.
+        present: Marks a client as present: a mission needs no client while it runs.
+
+    Attributes:
+        latest: The course of the latest mission; None before the first.
+    """
+
+    def __init__(
+        self,
+        checker: MissionChecker,
+        gate: SkillGate,
+        record: MissionRecord,
+        *,
+        present: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
+        self.check = checker.check
+        self.latest: MissionCourse | None = None
+        self._find_skill = checker.find_skill
+        self._gate = gate
+        self._record = record
+        self._present = present
+
+    def open(
+        self,
+        spec: SkillSpec,
+        tree: Step,
+        *,
+        remember: tuple[str, ...] = (),
+        path: Path | None = None,
+    ) -> Mission:
+        """Return a tree as a skill."""
+
+        async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
+            return await self._run(mission, arguments, on_progress)
+
+        mission = Mission(spec, run, tree, remember, path)
+        return mission
+
+    async def _run(
+        self, mission: Mission, arguments: Arguments, on_progress: OnProgress
+    ) -> SkillOutcome:
+        """Run a mission; within another mission it is a part of that one.
+
+        Raises:
+            ApprovalNeededError: A person has to agree to it first, once for all of it.
+            SkillError: It has a mistake, or another mission is under way.
+            PolicyError: It is not allowed.
+        """
+        spec = mission.spec
+        given = check_arguments(spec.parameters, arguments, skill=spec.name)
+        if _PARTS.get() is not None:
+            part = partial(self._go, MissionCourse(mission, given), on_progress)
+            return await self._gate.run_once(spec, part, command=None)
+        if self.latest is not None and not self.latest.is_over:
+            under_way = self.latest.mission.spec.name
+            raise SkillError(
+                f"The mission {under_way} is under way; there is one at a time.",
+                hint="Wait for its end, or cancel it.",
+            )
+        bounds = self.check(mission)
+        scope, guard = _scope_of(mission, given, bounds), self._gate.guard
+        self.latest = course = MissionCourse(mission, given)
+        token = _PARTS.set(bounds.parts)
+        try:
+            with self._present(), within_scope(scope):
+                return await self._gate.run_once(
+                    spec,
+                    partial(self._go_recorded, course, on_progress),
+                    command=RunSkill(
+                        skill=spec.name, arguments=given, needs_word=self._needs_word(spec, bounds)
+                    ),
+                    is_covering=False,
+                )
+        finally:
+            course.is_over = True
+            _PARTS.reset(token)
+            if guard is not None:
+                guard.end_scope(scope)
+
+    async def _go_recorded(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
+        said = "cut off"
+        self._record.begin(course.mission.spec.name)
+        try:
+            outcome = await self._go(course, on_progress)
+            said = str(outcome.state)
+        finally:
+            self._record.end(said)
+        return outcome
+
+    async def _go(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
+        # Loads py_trees: a server that runs no mission does without.
+        from mapspeak.skills.missionrunner import MissionRunner  # noqa: PLC0415
+
+        return await MissionRunner(
+            course,
+            find_skill=self._find_part,
+            facts=self._gate.facts,
+            on_progress=on_progress,
+            on_step=self._record.note,
+        ).run()
+
+    def _find_part(self, name: str) -> Skill:
+        """Return a skill; a mission as it was approved, whatever its file says by now."""
+        return (_PARTS.get() or {}).get(name) or self._find_skill(name)
+
+    def _needs_word(self, spec: SkillSpec, bounds: MissionBounds) -> bool:
+        """Return True where any part of it would need a person's word by itself."""
+        guard = self._gate.guard
+        kinds = frozenset() if guard is None else guard.policy.approval.kinds
+        asks_to_drive = bounds.n_drives > 0 and CommandKind.DRIVE in kinds
+        asks_for_more = bounds.n_commands > 0 and bool(kinds - {CommandKind.DRIVE})
+        return spec.is_always_asked or bool(bounds.asked) or asks_to_drive or asks_for_more
+
+
+def _scope_of(mission: Mission, given: Arguments, bounds: MissionBounds) -> ApprovalScope:
+    """Return the subject of an approval: this tree with these arguments, and no other one."""
+    leaves = [
+        " ".join(filter(None, (step.skill, plain(step.main or ""))))
+        for step in mission.tree.walk()
+        if step.skill
+    ]
+    steps = ", ".join(leaves)
+    told = steps if len(steps) <= MOST_TOLD else f"{steps[:MOST_TOLD]}..."
+    with_what = "".join(f", {name} {value}" for name, value in given.items())
+    asked = f"; asks for {', '.join(sorted(bounds.asked))}" if bounds.asked else ""
+    return ApprovalScope(
+        what=f"run the mission {mission.spec.name}{with_what} "
+        f"({told}{asked}; {_digest(mission, given, bounds.parts)})",
+        n_drives=bounds.n_drives,
+        duration_s=mission.spec.timeout_s,
+        n_commands=bounds.n_commands + 1,
+    )
+
+
+def _digest(mission: Mission, given: Arguments, parts: Mapping[str, Mission]) -> str:
+    """Return what tells a mission from any other one, with the missions within it."""
+    within: dict[str, JsonValue] = {name: repr(each.tree) for name, each in parts.items()}
+    specs = [repr(each.spec) for each in (mission, *parts.values())]
+    exact = json.dumps([repr(mission.tree), given, within, specs], default=str, sort_keys=True)
+    return hashlib.sha256(exact.encode()).hexdigest()[:8]

@@ -1,1 +1,0 @@
-"""Missions: trees of skills that the server runs by itself."""

@@ -1,1 +1,0 @@
-"""skills.yaml: the skills of a robot as its owner declares them."""
