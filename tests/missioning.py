@@ -10,7 +10,7 @@ from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.memory import SemanticMapStore
-from mapspeak.robot import CameraPicture
+from mapspeak.robot import CameraPicture, Robot
 from mapspeak.safety import Guard
 from mapspeak.server.app import MapspeakServer, build_server
 from mapspeak.session import Session
@@ -29,7 +29,7 @@ class MissionRobot(FakeRobot):
 
     def __init__(self, skills: Sequence[Skill] = ()) -> None:
         super().__init__(two_rooms())
-        self.skills: Sequence[Skill] = skills
+        self._skills = skills
         self.battery: float | None = 0.8
         self.may_drive = anyio.Event()
         self.may_drive.set()
@@ -40,6 +40,10 @@ class MissionRobot(FakeRobot):
         await anyio.lowlevel.checkpoint()
         await self.may_drive.wait()
         await super().sleep(duration_s)
+
+    def build_skills(self, driven: Robot) -> Sequence[Skill]:
+        del driven
+        return self._skills
 
     async def stop(self) -> None:
         await super().stop()

@@ -10,6 +10,8 @@ from dataclasses import KW_ONLY, dataclass, field
 from enum import StrEnum
 from typing import Any, Protocol
 
+from mapspeak.robot import Robot
+
 JsonValue = Any
 """A value of JSON: None, a truth value, a number, a text, a list or an object by its names."""
 Arguments = Mapping[str, JsonValue]
@@ -180,9 +182,12 @@ class Skill:
 class SkilledRobot(Protocol):
     """A robot with skills of its own, which need no ROS; `mapspeak.skills` guards each of them."""
 
-    @property
-    def skills(self) -> Sequence[Skill]:
-        """Its skills besides driving, looking and stopping."""
+    def build_skills(self, driven: Robot) -> Sequence[Skill]:
+        """Return its skills besides driving, looking and stopping.
+
+        Args:
+            driven: The robot itself, or what guards its drives: skills that drive send goals there.
+        """
 
     async def fetch_battery(self) -> float | None:
         """Return how full its battery is, from 0 to 1; None where it does not tell."""

@@ -30,7 +30,7 @@ class Owner:
         self.told: list[Mapping[str, JsonValue]] = []
 
     async def run(self, name: str, **arguments: JsonValue) -> SkillOutcome:
-        skill = next(each for each in self.robot.skills if each.spec.name == name)
+        skill = next(each for each in self.robot.build_skills(self.robot) if each.spec.name == name)
         return await skill.run(arguments, self.hear)
 
     def hear(self, progress: SkillProgress) -> None:

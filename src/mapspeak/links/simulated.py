@@ -1,7 +1,7 @@
 """The simulated robot behind the port, on a virtual clock or paced to real time."""
 
 import io
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from enum import StrEnum
 from typing import TypeVar
@@ -20,6 +20,7 @@ from mapspeak.robot import (
     GoalState,
     GoalStatus,
     RangeScan,
+    Robot,
     RobotDescription,
     StampedPose,
 )
@@ -31,6 +32,7 @@ from mapspeak.simulator import (
     TICK_S,
     Simulation,
 )
+from mapspeak.skill import Skill
 from mapspeak.spatial import OccupancyGrid
 
 CHUNK_S = 0.25
@@ -57,8 +59,6 @@ class SimulatedRobot:
     runs in a worker thread, so that the event loop stays free to answer a stop; values at hand are
     read directly.
 
-    Attributes:
-        skills: Its skills besides driving.
     """
 
     def __init__(
@@ -69,7 +69,6 @@ class SimulatedRobot:
         after_step: Callable[[], None] | None = None,
     ) -> None:
         self._simulation = simulation
-        self.skills = build_skills(self, simulation.equipment)
         self._has_detector = has_detector
         self._after_step = after_step or _do_nothing
         self._turn = anyio.Lock()
@@ -91,6 +90,10 @@ class SimulatedRobot:
     def now_s(self) -> float:
         """Robot time: seconds since the simulation began."""
         return self._simulation.time_s
+
+    def build_skills(self, driven: Robot) -> Sequence[Skill]:
+        """Return its skills besides driving, whose drives are goals to `driven`."""
+        return build_skills(self, driven, self._simulation.equipment)
 
     async def sleep(self, duration_s: float) -> None:
         """Let that much robot time pass, as fast as it can be computed."""

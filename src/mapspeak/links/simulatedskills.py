@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import anyio
 
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState
+from mapspeak.robot import GoalState, Robot
 from mapspeak.simulator import Equipment
 from mapspeak.skill import (
     Arguments,
@@ -38,15 +38,21 @@ Doing = Callable[["Hands", Arguments, OnProgress], Awaitable[SkillOutcome]]
 
 @dataclass(frozen=True, slots=True)
 class Hands:
-    """The context of a skill: the robot, and the state of the things it can use."""
+    """The context of a skill.
+
+    Attributes:
+        driven: Where goals are sent.
+        equipment: The state of the things that the robot can use.
+    """
 
     robot: "SimulatedRobot"
+    driven: Robot
     equipment: Equipment
 
 
-def build_skills(robot: "SimulatedRobot", equipment: Equipment) -> tuple[Skill, ...]:
+def build_skills(robot: "SimulatedRobot", driven: Robot, equipment: Equipment) -> tuple[Skill, ...]:
     """Return all skills of a simulated robot; the first runs fail that the world says do."""
-    hands = Hands(robot, equipment)
+    hands = Hands(robot, driven, equipment)
 
     async def run(
         spec: SkillSpec, doing: Doing, given: Arguments, on_progress: OnProgress
@@ -66,7 +72,7 @@ async def _dock(hands: Hands, given: Arguments, on_progress: OnProgress) -> Skil
         return failed(quote="No dock answers within 2.5 m.")
     if await robot.compute(equipment.dock_in_contact) is None:
         goal = (await robot.fetch_pose()).pose @ place
-        if await _drive(robot, goal) is not GoalState.ARRIVED:
+        if await _drive(hands.driven, goal) is not GoalState.ARRIVED:
             return failed(SkillCode.ABORTED, "The way onto the dock is blocked.")
     dock = await robot.compute(equipment.dock_in_contact)
     if dock is None:
@@ -81,7 +87,7 @@ async def _dock(hands: Hands, given: Arguments, on_progress: OnProgress) -> Skil
     return succeeded(battery_percent=round(100 * charge, 1))
 
 
-async def _drive(robot: "SimulatedRobot", goal: Pose) -> GoalState:
+async def _drive(robot: Robot, goal: Pose) -> GoalState:
     goal_id = await robot.send_goal(goal)
     state = GoalState.DRIVING
     try:

@@ -132,7 +132,7 @@ class RosStack(RosSystem):
         skilled: SkilledRobot | None = None,
     ) -> None:
         topics = topics_of(dialect, robot.description)
-        skills = () if skilled is None else skilled.skills
+        skills = () if skilled is None else skilled.build_skills(robot)
         if skilled is not None:
             topics.append(_published(BATTERY_TOPIC, BATTERY_TYPE, NODE, depth=1))
         interfaces = Interfaces(dialect, more=types_of(skills))

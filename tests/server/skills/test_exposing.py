@@ -143,6 +143,31 @@ async def test_tools_come_and_go_with_what_the_robot_offers(tmp_path: Path) -> N
     assert gone.is_error
 
 
+async def test_a_skill_that_the_robot_withdraws_mid_mission_fails_its_step(
+    tmp_path: Path,
+) -> None:
+    system = tool_system(Dialect.ROS2)
+    asked = offer_switch(system)
+    tree = """
+- tool_light: true
+- ask: Ready?
+- fallback:
+  - tool_light: true
+  - note: no light
+"""
+    async with exposed(system, tmp_path) as caller:
+        await caller.until(lambda tools: "tool_light" in tools)
+        await caller.ask("run_mission", tree=tree)
+        system.withdraw("/tool/light")
+        await caller.until(lambda tools: "tool_light" not in tools)
+        await caller.ask("answer_mission", answer="yes")
+        while ": running after" in (told := await caller.ask("skill_status", wait_s=0.05)):
+            pass
+    assert asked == [{"data": True}]
+    assert "tool_light: failed (rejected)" in told
+    assert "note: succeeded" in told
+
+
 async def test_a_client_of_the_older_protocol_is_told_of_new_tools_too(tmp_path: Path) -> None:
     system, told = tool_system(Dialect.ROS2), anyio.Event()
 

@@ -25,6 +25,8 @@ from skillmaking import FakeSkill, never, spec
 
 pytestmark = pytest.mark.anyio
 
+MOST_TURNS = 5
+"""Of the event loop, from a call of stop_robot to the robot's command."""
 TWO_ROOMS = "- drive: R2\n- look\n- drive: R1\n- note: all is well\n"
 
 
@@ -301,6 +303,111 @@ async def test_a_word_for_one_tree_is_none_for_another_of_the_same_size(tmp_path
         assert caller.robot.goals == {}
         await caller.ask("run_mission", tree="- drive: R2\n")
     assert "A person must agree" in other
+
+
+async def test_a_word_covers_the_missions_within_as_they_were_when_it_was_asked_for(
+    tmp_path: Path,
+) -> None:
+    guard = make_guard(tmp_path, Policy(approval=QUEUE))
+    async with missions(tmp_path, guard=guard) as caller:
+        await caller.ask("save_mission", name="visit", tree="- drive: R2\n")
+        await caller.refuse("run_mission", tree="- visit\n")
+        (wish,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(wish)
+        await caller.ask("save_mission", name="visit", tree="- drive: R1\n")
+        other = await caller.refuse("run_mission", tree="- visit\n")
+        assert caller.robot.goals == {}
+    assert "A person must agree" in other
+
+
+async def test_a_mission_under_way_does_its_parts_as_they_were_when_it_began(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        await caller.ask("save_mission", name="tell", tree="- note: as it was\n")
+        await caller.ask("save_mission", name="outer", tree="- ask: Ready?\n- tell\n")
+        await caller.ask("run_mission", tree="- outer\n", wait_s=0)
+        await caller.ask("save_mission", name="tell", tree="- note: as it is now\n")
+        await caller.ask("answer_mission", answer="yes")
+        await caller.until("succeeded")
+        record = (tmp_path / "semantic_map.memory" / "missions" / "record.jsonl").read_text()
+    assert "text=as it was" in record
+    assert "as it is now" not in record
+
+
+async def test_a_mission_within_a_mission_keeps_its_own_time_and_conditions(
+    tmp_path: Path,
+) -> None:
+    hang = FakeSkill(spec("hang", timeout_s=1000.0), do=never)
+    written = """
+skills:
+- {name: long, within_min: 0.1, mission: [{parallel: [hang, {wait: 100}]}]}
+- {name: charged, needs: {battery_above: 0.9}, mission: [hang]}
+"""
+    async with missions(tmp_path, hang, skills_file=written) as caller:
+        told = await caller.ask(
+            "run_mission", tree="fallback: [charged, long, {note: over}]", wait_s=20
+        )
+    assert "charged: failed (precondition)" in told
+    assert "long: timed_out (too_late)" in told
+    assert "note: succeeded" in told
+
+
+async def test_a_skill_with_a_mistake_in_it_ends_the_mission_and_nothing_drives_on(
+    tmp_path: Path,
+) -> None:
+    async def break_down(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:
+        raise ZeroDivisionError
+
+    lift = FakeSkill(spec("lift"), do=break_down)
+    async with missions(tmp_path, lift) as caller:
+        told = await caller.ask("run_mission", tree="fallback: [lift, {drive: R2}]")
+        assert caller.robot.goals == {}
+        after = await caller.ask("run_mission", tree="- drive: R2\n")
+    assert "How it ended is not known" in told
+    assert "succeeded" in after
+
+
+@pytest.mark.parametrize(
+    ("tree", "fault"),
+    [
+        ("&a\n- drive: R2\n- sequence: *a", "holds itself"),
+        ("sequence: [" + "look, " * 400 + "look]", "more than 300 steps"),
+        ("", "needs a list of steps"),
+        ("- fly: away", "There is no skill 'fly'"),
+        ("- drive: '{door.room}'", "which no step before gives"),
+        ("- wait: {duration_s: [1, 2]}", "duration_s cannot be"),
+    ],
+)
+async def test_a_tree_that_cannot_be_run_is_refused_and_nothing_moves(
+    tree: str, fault: str, tmp_path: Path
+) -> None:
+    async with missions(tmp_path) as caller:
+        refused = await caller.refuse("run_mission", tree=tree)
+        unsaved = await caller.refuse("save_mission", name="bad", tree=tree)
+        assert caller.robot.goals == {}
+    assert fault in refused
+    assert fault in unsaved
+
+
+@pytest.mark.parametrize("leaf", ["drive: R2", "look: R2", "wait: 100", "speak", "ask: Well?"])
+async def test_a_stop_in_any_leaf_is_the_next_command_without_waiting_for_anything(
+    leaf: str, tmp_path: Path
+) -> None:
+    speak = FakeSkill(spec("speak"), do=never)
+    async with missions(tmp_path, speak, guard=make_guard(tmp_path)) as caller:
+        caller.robot.may_drive = anyio.Event()
+        await caller.ask("run_mission", tree=f"- {leaf}\n", wait_s=0)
+        caller.robot.stopped = anyio.Event()
+        n_turns = 0
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(caller.ask, "stop_robot")
+            while not caller.robot.stopped.is_set():
+                await anyio.lowlevel.checkpoint()
+                n_turns += 1
+        await caller.until("cancelled")
+        caller.robot.may_drive.set()
+    assert n_turns <= MOST_TURNS
 
 
 async def test_a_saved_mission_is_a_skill_with_parameters_and_keeps_corrections(

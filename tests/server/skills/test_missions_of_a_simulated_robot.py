@@ -1,5 +1,6 @@
 """Missions on the simulated robot, and over its rosbridge as either ROS, to the same deeds."""
 
+import math
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
@@ -10,12 +11,14 @@ import anyio.lowlevel
 import pytest
 from mcp.client import Client
 
+from guarding import audit_of, make_guard, rectangle
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, open_rosbridge_robot
 from mapspeak.links.simulated import SimulatedRobot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
+from mapspeak.safety import CommandKind, Policy
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateRecord
@@ -150,3 +153,20 @@ async def test_a_cancelled_mission_leaves_the_robot_standing(link: str, tmp_path
         assert settled - before < 1.0
         assert "0" in await robot.ask("wait_for_goal", wait_s=0.0)
         assert robot.simulation.truth.driven_m == settled
+
+
+async def test_docking_is_a_drive_like_any_other_to_the_policy(tmp_path: Path) -> None:
+    simulation = Simulation(make_workshop(tmp_path), seed=1, start=Pose(1.7, 1.5, math.pi))
+    robot = SimulatedRobot(simulation, has_detector=False)
+    memory = SemanticMapStore(tmp_path / "semantic_map.yaml")
+    area = rectangle("charging", (0.1, -0.8), (1.6, 0.8))
+    guard = make_guard(tmp_path, Policy(areas=(area,)))
+    session = Session(
+        robot, memory, lease_s=60.0, guard=guard, skilled=robot, find_model=lambda: None
+    )
+    async with working(session, simulation, robot) as caller:
+        told = await caller.refuse("dock")
+    drives = [line for line in audit_of(tmp_path) if line.kind == CommandKind.DRIVE]
+    assert [line.verdict for line in drives] == ["refused"]
+    assert "charging" in told
+    assert simulation.truth.driven_m < 0.01

@@ -59,7 +59,7 @@ class SkillBook:
         self.desk = MissionDesk(checker, self._gate, record, present=session.client_is_heard)
         leaves = Leaves(session, facts, self.questions).list_skills()
         self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
-        own = () if session.skilled is None else session.skilled.skills
+        own = () if session.skilled is None else session.skilled.build_skills(session.robot)
         self._own = _by_name(self._gate.hold(each) for each in own)
         for entry in entries:
             if entry.name in (*self._built_in, *CONTROL):
