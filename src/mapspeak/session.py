@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import anyio
 import anyio.to_thread
@@ -97,13 +97,15 @@ class Session:
             self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
             when_busy = guard.policy.when_busy
             if ros is not None:
-                ros = GuardedConnection(
+                guarded = GuardedConnection(
                     ros,
                     guard=guard,
                     now_s=lambda: robot.now_s,
                     by_hand=self._guarded.by_hand,
                     planner=self._guarded.planner,
                 )
+                # What it does not guard, it passes on by name.
+                ros = cast("RosConnection", guarded)
         self.ros, self.skilled = ros, skilled
         self.robot: Robot = self._guarded or robot
         name_robot, lock = lambda: robot.description.name, threading.RLock()

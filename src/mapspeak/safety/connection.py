@@ -6,10 +6,9 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.activity import ActionGoal, Started, Subscription
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.messages.fields import Message
-from mapspeak.ros.patience import Patience
-from mapspeak.ros.port import LinkName, NodeLinks, OwnEnds, RosConnection, RosGraph
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety.commands import (
     Act,
     Call,
@@ -35,10 +34,21 @@ VELOCITY_TYPE = re.compile(
 )
 CANCEL_TYPE = re.compile(r"actionlib_msgs/(?:msg/)?GoalID")
 CANCEL_SERVICE_TYPE = re.compile(r"action_msgs/(?:srv/)?CancelGoal")
+HARMLESS = frozenset(
+    {
+        *("patience", "is_open", "connected_for_s", "lost_for_s", "link", "own_ends", "started"),
+        *("start_soon", "wait_until_connected", "clear_the_way"),
+        *("subscribe", "unsubscribe", "renew", "unadvertise", "advertise_late", "advertise_early"),
+        *("fetch_graph", "fetch_topics", "fetch_time_s", "fetch_nodes", "fetch_node"),
+        *("fetch_publishers", "fetch_subscribers", "fetch_services", "fetch_service_type"),
+        *("fetch_action_type", "fetch_definitions", "fetch_parameter_names", "fetch_parameter"),
+    }
+)
+"""Members of the port that are passed on; a new one is refused until it is guarded or named here."""
 
 
 class GuardedConnection:
-    """A `RosConnection` that changes only what its policy lets it; stopping always passes.
+    """A `RosConnection` that changes only what its policy allows; stopping always passes.
 
     Args:
         connection: The connection itself.
@@ -232,75 +242,7 @@ class GuardedConnection:
         self._connection.cancel_goal(goal)
         self._guard.note_event("stop", f"cancelled {goal.id}", robot_s=self._now_s())
 
-    def clear_the_way(self) -> None:
-        """Make sure that what is sent next is not held up by what was sent before."""
-        self._connection.clear_the_way()
-
-    # --- what reads ---
-
-    @property
-    def patience(self) -> Patience:
-        """How long to wait for what."""
-        return self._connection.patience
-
-    @property
-    def is_open(self) -> bool:
-        """True when something can be sent at once."""
-        return self._connection.is_open
-
-    @property
-    def connected_for_s(self) -> float | None:
-        """Since when topics and goals have been connected, in wall time; None while not."""
-        return self._connection.connected_for_s
-
-    @property
-    def lost_for_s(self) -> float | None:
-        """Since when the connection has been lost, in wall time; None while there is one."""
-        return self._connection.lost_for_s
-
-    @property
-    def link(self) -> LinkName:
-        """How we are connected."""
-        return self._connection.link
-
-    @property
-    def own_ends(self) -> OwnEnds:
-        """What of the system is our own doing."""
-        return self._connection.own_ends
-
-    @property
-    def started(self) -> Started:
-        """Everything that was started over this connection."""
-        return self._connection.started
-
-    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Run something in the background until the connection is closed."""
-        self._connection.start_soon(work)
-
-    async def wait_until_connected(self) -> None:
-        """Return at once, or when the connection is open again."""
-        await self._connection.wait_until_connected()
-
-    def subscribe(
-        self,
-        topic: str,
-        *,
-        type_name: str | None = None,
-        is_bulky: bool = False,
-        throttle_ms: int = 0,
-    ) -> Subscription:
-        """Return the subscription to a topic, subscribing first if needed."""
-        return self._connection.subscribe(
-            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
-        )
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """End one use of a subscription; the last one ends it at the robot too."""
-        self._connection.unsubscribe(subscription)
-
-    def renew(self, subscription: Subscription) -> None:
-        """Subscribe again, perhaps in another way: a latched message may have been missed."""
-        self._connection.renew(subscription)
+    # --- what only reads, or is undone by itself ---
 
     def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
         """Say that we will publish; the robot needs a moment until it listens.
@@ -313,69 +255,11 @@ class GuardedConnection:
         self._types[topic] = type_name
         self._connection.advertise(topic, type_name=type_name, is_latched=is_latched)
 
-    def unadvertise(self, topic: str) -> None:
-        """Take back what `advertise` said; do nothing for what was not advertised."""
-        self._connection.unadvertise(topic)
-
-    def advertise_late(self) -> None:
-        """Tell the robot of what is advertised from now on only with the first message there."""
-        self._connection.advertise_late()
-
-    def advertise_early(self) -> None:
-        """Tell the robot at once of all that is advertised, now and from now on."""
-        self._connection.advertise_early()
-
-    async def fetch_graph(self) -> RosGraph:
-        """Return the topics and actions there are."""
-        return await self._connection.fetch_graph()
-
-    async def fetch_topics(self) -> Mapping[str, str]:
-        """Return the type of each topic."""
-        return await self._connection.fetch_topics()
-
-    async def fetch_time_s(self) -> float | None:
-        """Return robot time; None where the robot does not say."""
-        return await self._connection.fetch_time_s()
-
-    async def fetch_nodes(self) -> tuple[str, ...]:
-        """Return the full names of all nodes, in their order."""
-        return await self._connection.fetch_nodes()
-
-    async def fetch_node(self, node: str) -> NodeLinks:
-        """Return what a node publishes, subscribes to and serves."""
-        return await self._connection.fetch_node(node)
-
-    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
-        """Return the nodes that publish on a topic."""
-        return await self._connection.fetch_publishers(topic)
-
-    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
-        """Return the nodes that listen to a topic."""
-        return await self._connection.fetch_subscribers(topic)
-
-    async def fetch_services(self) -> tuple[str, ...]:
-        """Return the full names of all services, in their order."""
-        return await self._connection.fetch_services()
-
-    async def fetch_service_type(self, service: str) -> str:
-        """Return a service's type, as "package/Type"."""
-        return await self._connection.fetch_service_type(service)
-
-    async def fetch_action_type(self, action: str) -> str:
-        """Return an action's type, as "package/Type"."""
-        return await self._connection.fetch_action_type(action)
-
-    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Return the .msg texts of a type and of every type within it."""
-        return await self._connection.fetch_definitions(type_name)
-
-    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Return the names of a node's parameters; ROS 1 keeps them below the node's name."""
-        return await self._connection.fetch_parameter_names(node)
-
-    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
-        """Return the value of a node's parameter; None where it is not set."""
-        return await self._connection.fetch_parameter(node, name)
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any member of the port
+        """Return a member of the connection that changes nothing on the robot."""
+        if name not in HARMLESS:
+            raise AttributeError(name)
+        return getattr(self._connection, name)
 
 
 def _is_stop(command: Publish | Call) -> bool:
