@@ -63,6 +63,18 @@ class Finding:
     hint: str = ""
 
 
+def _fine(what: str, said: str) -> Finding:
+    return Finding(what=what, health=Health.FINE, said=said)
+
+
+def _doubtful(what: str, said: str, hint: str) -> Finding:
+    return Finding(what=what, health=Health.DOUBTFUL, said=said, hint=hint)
+
+
+def _lacking(what: str, said: str, hint: str) -> Finding:
+    return Finding(what=what, health=Health.MISSING, said=said, hint=hint)
+
+
 async def examine(robot: Robot) -> tuple[Finding, ...]:
     """Ask a robot for its map, its pose and a picture, and judge the answers."""
     # A map that does not come is waited for once.
@@ -78,11 +90,10 @@ async def examine(robot: Robot) -> tuple[Finding, ...]:
         found.append(await _ask("place", partial(_look_at_place, robot, grid)))
     if goals := await robot.fetch_foreign_goals():
         found.append(
-            Finding(
-                what="goals",
-                health=Health.DOUBTFUL,
-                said=f"{len(goals)} under way that somebody else has sent",
-                hint="A new goal replaces them; stop_robot ends them.",
+            _doubtful(
+                "goals",
+                f"{len(goals)} under way that somebody else has sent",
+                "A new goal replaces them; stop_robot ends them.",
             )
         )
     if robot.description.has_camera:
@@ -100,7 +111,7 @@ async def _ask(what: str, look: Callable[[], Awaitable[Finding]]) -> Finding:
 
 
 def _missing(what: str, error: MapspeakError) -> Finding:
-    return Finding(what=what, health=Health.MISSING, said=error.message, hint=error.hint)
+    return _lacking(what, error.message, error.hint)
 
 
 def _say_age(robot: Robot, stamp_s: float) -> str:
@@ -112,13 +123,8 @@ def _judge_map(grid: OccupancyGrid) -> Finding:
     size = f"{grid.width_m:.1f} x {grid.height_m:.1f} m in cells of {grid.resolution_m:g} m"
     said = f"{size}, {free_m2:.1f} m2 of free floor"
     if free_m2 > 0:
-        return Finding(what="map", health=Health.FINE, said=said)
-    return Finding(
-        what="map",
-        health=Health.DOUBTFUL,
-        said=said,
-        hint="Let SLAM see something: check that the laser publishes.",
-    )
+        return _fine("map", said)
+    return _doubtful("map", said, "Let SLAM see something: check that the laser publishes.")
 
 
 async def _look_at_pose(robot: Robot) -> Finding:
@@ -126,12 +132,9 @@ async def _look_at_pose(robot: Robot) -> Finding:
     pose, age_s = stamped.pose, max(robot.now_s - stamped.stamp_s, 0.0)
     said = f"x {pose.x:.2f}, y {pose.y:.2f}, yaw {pose.yaw_deg:.0f} deg, {age_s:.1f} s old"
     if age_s <= OLD_POSE_S:
-        return Finding(what="pose", health=Health.FINE, said=said)
-    return Finding(
-        what="pose",
-        health=Health.DOUBTFUL,
-        said=said,
-        hint="Check that SLAM or AMCL runs, and that the clocks agree (use_sim_time, NTP).",
+        return _fine("pose", said)
+    return _doubtful(
+        "pose", said, "Check that SLAM or AMCL runs, and that the clocks agree (use_sim_time, NTP)."
     )
 
 
@@ -147,16 +150,11 @@ async def _look_at_place(robot: Robot, grid: OccupancyGrid) -> Finding:
             f"the robot stands {clear_m:.2f} m from an obstacle, its radius is {radius_m:.2f} m"
         )
     room = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m to any obstacle"
-    return Finding(what="place", health=Health.FINE, said=f"on its map, {room}")
+    return _fine("place", f"on its map, {room}")
 
 
 def _misplaced(said: str) -> Finding:
-    return Finding(
-        what="place",
-        health=Health.DOUBTFUL,
-        said=said,
-        hint="Set the initial pose, or the robot's radius_m in robot.yaml.",
-    )
+    return _doubtful("place", said, "Set the initial pose, or the robot's radius_m in robot.yaml.")
 
 
 async def _look_at_picture(robot: Robot) -> Finding:
@@ -165,17 +163,16 @@ async def _look_at_picture(robot: Robot) -> Finding:
     fov_rad = picture.horizontal_fov_rad
     wide = ", angle unknown" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
     said = f"{picture.media_type}, {size}{wide}, {_say_age(robot, picture.stamp_s)}"
-    return Finding(what="picture", health=Health.FINE, said=said)
+    return _fine("picture", said)
 
 
 async def _look_at_laser(robot: Robot, grid: OccupancyGrid | None) -> Finding:
     scan = await robot.fetch_scan()
     if scan is None:
-        return Finding(
-            what="laser",
-            health=Health.DOUBTFUL,
-            said="no scan that can be used came; all else works without",
-            hint="Check that it publishes, that the clocks agree, and that TF leads from the "
+        return _doubtful(
+            "laser",
+            "no scan that can be used came; all else works without",
+            "Check that it publishes, that the clocks agree, and that TF leads from the "
             "robot's base to its frame.",
         )
     met = np.isfinite(scan.ranges_m)
@@ -183,18 +180,17 @@ async def _look_at_laser(robot: Robot, grid: OccupancyGrid | None) -> Finding:
     said += _say_age(robot, scan.stamp_s)
     if grid is None:
         said += "; there is no map to compare with"
-        return Finding(what="laser", health=Health.FINE, said=said)
+        return _fine("laser", said)
     ratio = _share_on_map(grid, scan)
     if ratio is None:
-        return Finding(what="laser", health=Health.DOUBTFUL, said=said, hint="Is it covered?")
+        return _doubtful("laser", said, "Is it covered?")
     said += f", {100 * ratio:.0f} % of that is on the map"
     if ratio >= LEAST_ON_MAP_RATIO:
-        return Finding(what="laser", health=Health.FINE, said=said)
-    return Finding(
-        what="laser",
-        health=Health.DOUBTFUL,
-        said=said,
-        hint="Set the initial pose, or check how the laser is mounted by TF: turned, or upside "
+        return _fine("laser", said)
+    return _doubtful(
+        "laser",
+        said,
+        "Set the initial pose, or check how the laser is mounted by TF: turned, or upside "
         "down. On a map that is old it may be right.",
     )
 
@@ -241,8 +237,8 @@ def describe_profile(
     distro = profile.distro or "distribution not told"
     age = "" if map_age_s is None else f", stamped {map_age_s:.1f} s ago"
     return (
-        Finding(what="link", health=Health.FINE, said=_say_link(link) + (reason and f", {reason}")),
-        Finding(what="ROS", health=Health.FINE, said=f"{ros}, {distro}"),
+        _fine("link", _say_link(link) + (reason and f", {reason}")),
+        _fine("ROS", f"{ros}, {distro}"),
         *_describe_namespace(profile),
         _describe(RobotPart.MAP, "map topic", profile, START_MAP, Health.MISSING, more=age),
         _describe_pose(profile),
@@ -277,7 +273,7 @@ def _describe(
             said = f"{topic} is named, but nobody {nobody}"
             return Finding(what=what, health=health, said=said, hint=hint)
         case _:
-            return Finding(what=what, health=Health.FINE, said=f"{topic}{more}")
+            return _fine(what, f"{topic}{more}")
 
 
 def _describe_namespace(profile: RobotProfile) -> tuple[Finding, ...]:
@@ -285,10 +281,10 @@ def _describe_namespace(profile: RobotProfile) -> tuple[Finding, ...]:
     if others:
         said = f"{len(others)} robots are here: {', '.join(others)}"
         hint = f"Say in robot.yaml which one is meant: `namespace: {others[0]}`."
-        return (Finding(what="namespace", health=Health.MISSING, said=said, hint=hint),)
+        return (_lacking("namespace", said, hint),)
     if not profile.namespace:
         return ()
-    return (Finding(what="namespace", health=Health.FINE, said=profile.namespace),)
+    return (_fine("namespace", profile.namespace),)
 
 
 def _describe_pose(profile: RobotProfile) -> Finding:
@@ -296,40 +292,40 @@ def _describe_pose(profile: RobotProfile) -> Finding:
     match profile.pose_source:
         case PoseSource.TF:
             said = f"TF from {profile.map_frame} to {profile.base_frame}"
-            return Finding(what=what, health=Health.FINE, said=said)
+            return _fine(what, said)
         case PoseSource.POSE_TOPIC:
-            return Finding(what=what, health=Health.FINE, said=f"{profile.pose_topic}")
+            return _fine(what, f"{profile.pose_topic}")
         case PoseSource.ODOMETRY:
             said = f"{profile.pose_topic}: odometry, which drifts against the map"
-            return Finding(what=what, health=Health.DOUBTFUL, said=said, hint=START_POSE)
+            return _doubtful(what, said, START_POSE)
         case PoseSource.NONE:
-            return Finding(what=what, health=Health.MISSING, said="none found", hint=START_POSE)
+            return _lacking(what, "none found", START_POSE)
 
 
 def _describe_planner(profile: RobotProfile) -> Finding:
     said = profile.planner_name or "none found, and none needed for goals"
-    return Finding(what="planner", health=Health.FINE, said=said)
+    return _fine("planner", said)
 
 
 def _describe_radius(profile: RobotProfile) -> Finding:
     said = f"{profile.radius_m:.2f} m, {profile.radius_source or 'assumed'}"
     if profile.radius_source:
-        return Finding(what="radius", health=Health.FINE, said=said)
-    return Finding(what="radius", health=Health.DOUBTFUL, said=said, hint=START_RADIUS)
+        return _fine("radius", said)
+    return _doubtful("radius", said, START_RADIUS)
 
 
 def _describe_navigation(profile: RobotProfile) -> Finding:
     what, name = "navigation", profile.navigation_name
     worth = RobotPart.NAVIGATION.worth(profile)
     if worth is Worth.MISSING:
-        return Finding(what=what, health=Health.MISSING, said="none found", hint=START_NAVIGATION)
+        return _lacking(what, "none found", START_NAVIGATION)
     if worth is Worth.NAMED:
         said = f"{profile.navigation}: {name} is named, but nobody serves it"
-        return Finding(what=what, health=Health.MISSING, said=said, hint=START_NAVIGATION)
+        return _lacking(what, said, START_NAVIGATION)
     if profile.navigation is NavigationKind.GOAL_TOPIC:
         said = f"{name}: a topic for goals, which does not say how a drive ends"
-        return Finding(what=what, health=Health.DOUBTFUL, said=said, hint=START_NAVIGATION)
-    return Finding(what=what, health=Health.FINE, said=f"{profile.navigation}: {name}")
+        return _doubtful(what, said, START_NAVIGATION)
+    return _fine(what, f"{profile.navigation}: {name}")
 
 
 SIGNS = {Health.FINE: "ok", Health.DOUBTFUL: "??", Health.MISSING: "--"}
@@ -380,10 +376,10 @@ def find_servers(choice: RobotChoice) -> list[Finding]:
         return []
     if len(processes) == 1:
         said = f"1 serves this robot: process {processes[0]}"
-        return [Finding(what="servers", health=Health.FINE, said=said)]
+        return [_fine("servers", said)]
     said = f"{len(processes)} serve this robot: processes {', '.join(map(str, processes))}"
     hint = "Their goals replace each other and their velocities alternate: end all but one."
-    return [Finding(what="servers", health=Health.DOUBTFUL, said=said, hint=hint)]
+    return [_doubtful("servers", said, hint)]
 
 
 def _show(findings: Sequence[Finding]) -> None:

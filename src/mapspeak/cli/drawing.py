@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,28 +43,30 @@ DRAWING_OPTIONS = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrawingChoice:
-    """Where else what lies on the map is drawn."""
-
-    has_markers: bool = False
-    record: Path | None = None
-    foxglove: str | None = None
-
-
 def open_drawing(
     opened: "Mapping[str, tuple[Session, RosConnection | None]]",
-    choice: DrawingChoice,
     notes: "Mapping[str, CallNoting | None]",
     links: AsyncExitStack,
+    *,
+    has_markers: bool,
+    record: Path | None,
+    foxglove: str | None,
 ) -> "tuple[list[Callable[[], Coroutine[Any, Any, None]]], dict[str, CallNoting | None]]":
     """Return what draws the robots in the background, and where the calls of each are noted.
+
+    Args:
+        opened: The session and the ROS of each robot, by its name.
+        notes: Where the calls of each are noted without a drawing.
+        links: Closes what is opened.
+        has_markers: Publish markers on the robot's ROS.
+        record: A file (MCAP) to record to.
+        foxglove: An address of this machine at which Foxglove is served.
 
     Raises:
         ConfigError: A robot has no ROS, or what is chosen cannot be opened.
     """
     drawers: list[Callable[[], Coroutine[Any, Any, None]]] = []
-    if choice.has_markers:
+    if has_markers:
         from mapspeak.server.view.marking import MarkerPublisher  # noqa: PLC0415 - heavy
 
         for name, (session, ros) in opened.items():
@@ -76,7 +77,7 @@ def open_drawing(
                     "and --record show the simulated robot without ROS.",
                 )
             drawers.append(MarkerPublisher(session, ros, name=name).run)
-    recorders = _open_recorders(choice, links)
+    recorders = _open_recorders(record, foxglove, links)
     if not recorders:
         return drawers, dict(notes)
     from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - heavy
@@ -88,8 +89,10 @@ def open_drawing(
     return drawers, {**calls}
 
 
-def _open_recorders(choice: DrawingChoice, links: AsyncExitStack) -> "list[Recorder]":
-    if choice.record is None and choice.foxglove is None:
+def _open_recorders(
+    record: Path | None, foxglove: str | None, links: AsyncExitStack
+) -> "list[Recorder]":
+    if record is None and foxglove is None:
         return []
     if find_spec("foxglove") is None:
         raise ConfigError(
@@ -100,15 +103,15 @@ def _open_recorders(choice: DrawingChoice, links: AsyncExitStack) -> "list[Recor
     from mapspeak.server.wire.doors import is_loopback, parse_address  # noqa: PLC0415 - heavy
 
     recorders = []
-    if choice.record is not None:
-        recorders.append(links.enter_context(record_to(choice.record)))
-    if choice.foxglove is not None:
-        host, port = parse_address(choice.foxglove)
+    if record is not None:
+        recorders.append(links.enter_context(record_to(record)))
+    if foxglove is not None:
+        host, port = parse_address(foxglove)
         if not is_loopback(host):
             raise ConfigError(
                 f"{host} can be reached from other machines, and Foxglove asks for no password.",
                 hint="Serve it on 127.0.0.1, and reach it through an SSH tunnel.",
             )
         recorders.append(links.enter_context(serve_foxglove(host, port)))
-        click.echo(f"mapspeak: for Foxglove at ws://{choice.foxglove}", err=True)
+        click.echo(f"mapspeak: for Foxglove at ws://{foxglove}", err=True)
     return recorders

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -86,7 +86,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
 )
 @click.option(
     "--thinking",
-    callback=_split,
+    callback=lambda *given: _split(*given) or (None,),
     default="",
     help="How much a model may think, comma-separated: none, low, medium, high. Without it the "
     "provider decides.",
@@ -119,21 +119,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     is_flag=True,
     help="Run nothing; make page and log of --out anew from all results that are there.",
 )
-def evaluate(
-    agents: tuple[str, ...],
-    tasks: tuple[str, ...],
-    worlds: tuple[str, ...],
-    n_trials: int,
-    seed: int,
-    folder: Path,
-    representations: tuple[str, ...],
-    thinking: tuple[str, ...],
-    n_jobs: int,
-    hang_s: float,
-    has_retry: bool,  # noqa: FBT001 - a flag
-    is_quiet: bool,  # noqa: FBT001 - a flag
-    is_report_only: bool,  # noqa: FBT001 - a flag
-) -> None:
+def evaluate(*, folder: Path, is_quiet: bool, is_report_only: bool, **chosen: Any) -> None:  # noqa: ANN401 - fields of RunOptions
     """Run tasks in simulated worlds and score them by the simulator's truth.
 
     Without options this is a small try: a script, the paper's three tasks, one flat. The paper's
@@ -149,20 +135,8 @@ def evaluate(
     if is_report_only:
         _report(folder)
         return
-    options = RunOptions(
-        agents=agents,
-        tasks=tasks,
-        worlds=worlds,
-        n_trials=n_trials,
-        seed=seed,
-        folder=folder,
-        representations=representations,
-        thinking=thinking or (None,),
-        n_jobs=n_jobs,
-        hang_s=hang_s,
-        has_retry=has_retry,
-    )
-    for agent in agents:
+    options = RunOptions(folder=folder, **chosen)
+    for agent in options.agents:
         for amount in options.thinking:
             check_agent(agent, amount)
     sys.exit(_run(options, is_quiet=is_quiet))

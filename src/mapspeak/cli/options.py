@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,26 +82,6 @@ def add_options(options: Sequence[Decorator]) -> Decorator:
     return add
 
 
-def grouped(name: str, make: Callable[..., object], fields: Sequence[str]) -> Decorator:
-    """Return a decorator that hands some options to a command as one value.
-
-    Args:
-        name: The argument that takes the value.
-        make: Builds the value from the options.
-        fields: The names of the options, and of their fields in the value.
-    """
-
-    def group(function: Command) -> Command:
-        @wraps(function)
-        def call(**options: object) -> object:
-            made = make(**{field: options.pop(field) for field in fields})
-            return function(**options, **{name: made})
-
-        return call
-
-    return group
-
-
 def read_pose(
     _context: click.Context, _parameter: click.Parameter, value: str | None
 ) -> Pose | None:
@@ -161,19 +140,6 @@ GUARD_OPTIONS = (
     ),
     CONTROL_OPTION,
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SkillChoice:
-    """The options of `mapspeak serve` about skills.
-
-    Attributes:
-        expose: Patterns of names of the robot that are tools.
-        skill_files: The owner's.
-    """
-
-    expose: tuple[str, ...] = ()
-    skill_files: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import anyio
 import click
 
-from mapspeak.cli.drawing import DRAWING_OPTIONS, DrawingChoice, open_drawing
+from mapspeak.cli.drawing import DRAWING_OPTIONS, open_drawing
 from mapspeak.cli.options import (
     DEFAULT_WORLD,
     FILE,
@@ -26,15 +26,13 @@ from mapspeak.cli.options import (
     ROBOT_OPTIONS,
     SKILL_OPTIONS,
     GuardChoice,
-    SkillChoice,
     add_options,
-    grouped,
     read_pose,
     read_representation,
     split_names,
 )
 from mapspeak.cli.robots import RobotChoice
-from mapspeak.cli.starting import RobotOptions, RobotStart, open_session, read_starts
+from mapspeak.cli.starting import RobotStart, open_session, read_starts
 from mapspeak.cli.viewing import VIEW_OPTION, make_page
 from mapspeak.installation import shell_command
 
@@ -55,26 +53,26 @@ SIMULATION = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeOptions:
-    """The options of `mapspeak serve`."""
+    """The options of `mapspeak serve`, as they were given, but for `robots`.
+
+    Attributes:
+        robots: Each robot as it is to be served, by its name.
+    """
 
     robots: Mapping[str, RobotStart]
     http: str | None
-    tools: "ToolChoice"
+    toolsets: tuple[str, ...] | None
+    tools: tuple[str, ...] | None
+    is_read_only: bool
     lease_s: float
     representation: "Representation | None"
     call_log: Path | None
     view: str | None
-    drawing: DrawingChoice
-    skills: SkillChoice
-
-
-@dataclass(frozen=True, slots=True)
-class ToolChoice:
-    """The tools to offer: groups and single ones, as named."""
-
-    sets: tuple[str, ...]
-    single: tuple[str, ...]
-    is_read_only: bool
+    has_markers: bool
+    record: Path | None
+    foxglove: str | None
+    expose: tuple[str, ...]
+    skill_files: tuple[Path, ...]
 
 
 @click.command()
@@ -175,42 +173,17 @@ class ToolChoice:
 @VIEW_OPTION
 @add_options(DRAWING_OPTIONS)
 @add_options(GUARD_OPTIONS)
-@grouped("choice", partial(RobotChoice, robot=""), SIMULATION)
-@grouped("guard", GuardChoice, ("audit", "control"))
-@grouped("skills", SkillChoice, ("expose", "skill_files"))
-@grouped("drawing", DrawingChoice, ("has_markers", "record", "foxglove"))
-def serve(
-    robots: tuple[str, ...],
-    robot_files: tuple[str, ...],
-    choice: RobotChoice,
-    http: str | None,
-    toolsets: tuple[str, ...] | None,
-    tools: tuple[str, ...] | None,
-    skills: SkillChoice,
-    is_read_only: bool,  # noqa: FBT001 - a flag
-    semantic_maps: tuple[str, ...],
-    lease_s: float,
-    representation: "Representation | None",
-    call_log: Path | None,
-    view: str | None,
-    drawing: DrawingChoice,
-    policies: tuple[str, ...],
-    guard: GuardChoice,
-) -> None:
+def serve(robots: tuple[str, ...], **given: Any) -> None:  # noqa: ANN401 - click's options
     """Serve a robot, or several, to MCP clients, over stdio or streaming HTTP."""
-    given = RobotOptions(robots, robot_files, semantic_maps, policies)
-    options = ServeOptions(
-        robots=read_starts(given, choice, guard),
-        http=http,
-        tools=ToolChoice(toolsets or (), tools or (), is_read_only),
-        lease_s=lease_s,
-        representation=representation,
-        call_log=call_log,
-        view=view,
-        drawing=drawing,
-        skills=skills,
+    starts = read_starts(
+        robots,
+        RobotChoice(robot="", **{name: given.pop(name) for name in SIMULATION}),
+        GuardChoice(audit=given.pop("audit"), control=given.pop("control")),
+        robot_files=given.pop("robot_files"),
+        semantic_maps=given.pop("semantic_maps"),
+        policies=given.pop("policies"),
     )
-    anyio.run(_serve, options)
+    anyio.run(_serve, ServeOptions(robots=starts, **given))
 
 
 async def _serve(options: ServeOptions) -> None:
@@ -230,7 +203,14 @@ async def _serve(options: ServeOptions) -> None:
         call_log = None if options.call_log is None else CallLog(options.call_log)
         page = make_page(sessions, call_log, options.view, tells_token=options.http is not None)
         noted = {name: feed.calls for name, feed in page.feeds.items()}
-        drawers, notes = open_drawing(opened, options.drawing, noted, links)
+        drawers, notes = open_drawing(
+            opened,
+            noted,
+            links,
+            has_markers=options.has_markers,
+            record=options.record,
+            foxglove=options.foxglove,
+        )
         servers = {
             name: _build_server(session, options, notes[name]) for name, session in sessions.items()
         }
@@ -286,21 +266,21 @@ def _build_server(
     from mapspeak.server.tools.ros.inquiry import require_ros  # noqa: PLC0415
     from mapspeak.skills.skillsfile import load_skills  # noqa: PLC0415
 
-    chosen = options.tools
-    is_added = any(name.startswith("+") for name in chosen.sets)
-    named = tuple(name.removeprefix("+") for name in chosen.sets)
+    sets = options.toolsets or ()
+    is_added = any(name.startswith("+") for name in sets)
+    named = tuple(name.removeprefix("+") for name in sets)
     toolsets = (*DEFAULT_TOOLSETS, *named) if is_added or not named else named
-    is_ros = "ros" if options.skills.expose else ""
-    require_ros(session, toolsets=(*toolsets, is_ros), tools=chosen.single)
+    tools = options.tools or ()
+    require_ros(session, toolsets=(*toolsets, "ros" if options.expose else ""), tools=tools)
     return build_server(
         session,
         toolsets=toolsets,
-        tools=chosen.single,
-        is_read_only=chosen.is_read_only,
+        tools=tools,
+        is_read_only=options.is_read_only,
         representation=options.representation or Representation.PICTURE_TABLE,
         call_log=call_log,
-        expose=options.skills.expose,
-        skills=[each for path in options.skills.skill_files for each in load_skills(path)],
+        expose=options.expose,
+        skills=[each for path in options.skill_files for each in load_skills(path)],
     )
 
 

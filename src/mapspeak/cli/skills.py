@@ -3,7 +3,6 @@
 import math
 from collections.abc import AsyncGenerator
 from contextlib import AsyncExitStack, asynccontextmanager
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -18,7 +17,6 @@ from mapspeak.cli.options import (
     ROBOT_HELP,
     GuardChoice,
     add_options,
-    grouped,
 )
 from mapspeak.cli.robots import RobotChoice
 from mapspeak.cli.starting import RobotStart, open_session
@@ -74,12 +72,11 @@ def list_skills(file: Path) -> None:
 @ROBOT_OPTION
 @add_options(GUARD_OPTIONS[1:])
 @click.option("--policy", type=FILE, help="policy.yaml: limits, closed areas, approvals.")
-@grouped("guard", GuardChoice, ("policy", "audit", "control"))
 def try_skill(
-    file: Path, name: str, arguments: tuple[str, ...], robot: str, guard: GuardChoice
+    file: Path, name: str, arguments: tuple[str, ...], robot: str, **limits: Path | None
 ) -> None:
     """Run the skill NAME of FILE once, as a model would, and say how it ended."""
-    anyio.run(partial(_try, _load(file), name, arguments, robot, guard))
+    anyio.run(_try, _load(file), name, arguments, robot, GuardChoice(**limits))
 
 
 def _load(file: Path) -> "tuple[OwnersEntry, ...]":

@@ -1,5 +1,6 @@
 """The robots to serve, and the configuration of each."""
 
+from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,33 +37,29 @@ class RobotStart:
     guard: GuardChoice
 
 
-@dataclass(frozen=True, slots=True)
-class RobotOptions:
-    """Options that may differ between robots, as on the command line: "NAME=..."."""
-
-    robots: tuple[str, ...]
-    robot_files: tuple[str, ...]
-    semantic_maps: tuple[str, ...]
-    policies: tuple[str, ...]
-
-
 def read_starts(
-    given: RobotOptions, choice: RobotChoice, guard: GuardChoice
+    robots: Sequence[str],
+    choice: RobotChoice,
+    guard: GuardChoice,
+    *,
+    robot_files: Sequence[str],
+    semantic_maps: Sequence[str],
+    policies: Sequence[str],
 ) -> dict[str, RobotStart]:
     """Return each robot as it is to be served, by its name.
 
     Args:
-        given: Options that may differ between robots.
+        robots: Addresses, of several robots each as "NAME=ADDRESS"; likewise what follows.
         choice: Options that are the same for all of them.
         guard: Likewise.
 
     Raises:
         ConfigError: Some options contradict each other.
     """
-    named = name_robots(given.robots)
-    files = split_files(given.robot_files, named, "--robot-file")
-    memories = split_memories(given.semantic_maps, named)
-    limits = split_files(given.policies, named, "--policy")
+    named = name_robots(robots)
+    files = split_files(robot_files, named, "--robot-file")
+    memories = split_memories(semantic_maps, named)
+    limits = split_files(policies, named, "--policy")
     if len(named) > 1 and _is_for_one(choice):
         raise ConfigError(
             "--state-log, --final-map, --map and --start are for one robot.",
