@@ -5,7 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from mapspeak.errors import ConfigError
 from mapspeak.simulator import World, load_world, world_names
@@ -13,6 +15,8 @@ from mapspeak.simulator.worlds.models import kind_names
 from mapspeak.simulator.worlds.worldfiles import parse_world, read_world_text
 from mapspeak.spatial.rooms import RoomClass
 from tools.worldgen import draw_plan, find_faults, style_names
+from tools.worldgen.surfaces import SHIPPED as SURFACES
+from tools.worldgen.surfaces import draw_surface, surface_names
 
 SHIPPED = [(style, seed) for style in style_names() for seed in (1, 2)]
 MORE_SEEDS = (3, 4)
@@ -108,3 +112,11 @@ def _size_m(world: World) -> tuple[float, float]:
     corners = [corner for room in world.rooms for corner in room.outline]
     xs, ys = [corner.x for corner in corners], [corner.y for corner in corners]
     return max(xs) - min(xs), max(ys) - min(ys)
+
+
+@pytest.mark.parametrize("name", surface_names())
+def test_the_shipped_surfaces_are_those_that_are_drawn(name: str) -> None:
+    with Image.open(SURFACES / f"{name}.png") as shipped:
+        # Versions of Pillow differ by a shade at smooth edges.
+        off = np.abs(np.asarray(shipped, np.int16) - np.asarray(draw_surface(name), np.int16))
+    assert off.mean() < 1.0

@@ -51,8 +51,6 @@ class Finding:
     """One line of a check-up.
 
     Attributes:
-        what: The thing: map, pose, camera, ...
-        health: Its state.
         said: What was found, with numbers and units.
         hint: What to start or to change; empty where all is well.
     """
@@ -228,8 +226,6 @@ def describe_profile(
     """Return a line for each thing that mapspeak uses of a robot.
 
     Args:
-        profile: What was found.
-        link: How we are connected.
         reason: Why in that way; empty where it is obvious.
         map_age_s: Since the map's stamp; None where there is no map.
     """

@@ -205,10 +205,8 @@ class MapJob:
 
     Attributes:
         file: The .yaml or the bare picture.
-        name: Its name among the others.
         resolution_m: The side of a pixel, for a bare picture.
         anchor: Where on Earth the map lies, if given.
-        outputs: The files to write.
         start: Where ways are measured from, if they are wanted.
         is_grey_unknown: Takes the grey of unknown for that, whatever the .yaml says.
     """
@@ -232,9 +230,7 @@ def plan_jobs(
     """Return one job for each map, after looking whether all of them can be done.
 
     Args:
-        selection: The maps.
         resolution_m: The side of a pixel, for bare pictures; a .yaml file says it itself.
-        anchor: Where on Earth the maps lie.
         outputs: What to write: files when there is one map, else folders.
 
     Raises:

@@ -85,7 +85,6 @@ def hold_robots(
     """Hold every robot of a folder; return those that stopped, and those that did not say so.
 
     Args:
-        hold: Of that folder.
         reason: For the log.
         wait_s: How long to wait for answers, in wall time.
 
@@ -149,12 +148,7 @@ Tell = Callable[[str], None]
 
 
 class StopKeys:
-    """The effects of the keys of one terminal.
-
-    Args:
-        hold: Keeps the robot standing.
-        tell: Shows a line to the person.
-    """
+    """The effects of the keys of one terminal."""
 
     def __init__(self, hold: "Hold", *, tell: Tell) -> None:
         self._hold = hold
@@ -202,8 +196,6 @@ def stop_keys(
     The terminal gives each key at once meanwhile, and is set back afterwards. Ctrl-C stays.
 
     Args:
-        hold: Keeps the robot standing.
-        tell: Shows a line to the person.
         terminal: Its file descriptor; standard input unless given.
     """
     terminal = _find_standard_input() if terminal is None else terminal

@@ -161,7 +161,6 @@ def build_guard(choice: GuardChoice, *, robot: str, address: str = "") -> "Guard
     """Build the guard of the commands to a robot.
 
     Args:
-        choice: Of files.
         robot: Its name in the log.
         address: Where it is; empty for one that no other program can reach.
 

@@ -174,7 +174,6 @@ class ServedRobot:
     """A robot for a server, which may not be there yet.
 
     Attributes:
-        robot: The robot.
         ros: The connection of one that speaks ROS.
         map_name: The map or building it drives in; empty where not given.
         skilled: The robot where it has skills of its own.

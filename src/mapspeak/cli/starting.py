@@ -27,9 +27,7 @@ class RobotStart:
     """One robot as it is to be served.
 
     Attributes:
-        choice: The robot, and how to reach it.
         memory: A file, or the address of a database; None for the usual file.
-        guard: The limits of its commands.
     """
 
     choice: RobotChoice
@@ -87,8 +85,6 @@ async def open_session(
 
     Args:
         name: The operator's name for the robot; empty for an only one.
-        start: How it is to be served.
-        links: Closes what is opened.
         scratch: A folder for a memory that does not last.
         lease_s: A driving robot is stopped after this time without a client.
     """

@@ -126,7 +126,6 @@ def make_page(
     """Return the live page of some robots.
 
     Args:
-        sessions: By the robots' names.
         call_log: Where calls are written as well.
         address: Where the page is wanted; None for nowhere yet.
         tells_token: The terminal is a person's own, and no client's log.

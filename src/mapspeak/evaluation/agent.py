@@ -155,7 +155,6 @@ class Assignment:
 
     Attributes:
         system: The server's instructions and the guidance of the task.
-        seed: For all its random draws.
         server: The command line of its server, for agents that start it themselves.
         folder: The trial's folder; an agent may keep files there.
     """
@@ -194,7 +193,6 @@ class Agent:
     """A script, a model or a client program.
 
     Attributes:
-        name: As in `Trial.agent`.
         work: Carries out an assignment by calling tools; it lets an OutOfBudgetError pass through.
         connection: How it reaches the server: scripts read what tools answer, and need no pipe.
     """

@@ -87,7 +87,6 @@ class Setting:
         battery_ratio: Initial charge of the battery.
         n_faults: Number of failures of each skill before it works.
         toolsets: Offered groups of tools; None for the server's default.
-        tools: Further single tools.
         inspected: The ROS to inspect instead of the simulated robot, which is then absent; None
             for the simulated robot.
         truth: The scorer's data as JSON; shown only to the oracle agent. A right answer that needs
@@ -171,7 +170,6 @@ class TokenCounts:
     """Tokens of a model; None if there was no model, or no count.
 
     Attributes:
-        n_input_tokens: Input, cached ones included.
         n_output_tokens: Output, thoughts included.
         n_picture_tokens: Part of the input that was pictures.
     """

@@ -1,4 +1,4 @@
-"""Is this goal sensible? Why not? What instead?"""
+"""Checks of a goal against the map: whether it works, why not, and what would work instead."""
 
 import math
 from collections.abc import Callable
@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from mapspeak.errors import NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
@@ -267,6 +268,20 @@ def say_refusal(name: str, check: GoalCheck) -> str:
     """Return why a place cannot be a goal, with its name if the sentence lacks it."""
     sentence = say_check(check)
     return sentence if name in sentence else f"{name}: {sentence}"
+
+
+def say_instead(check: GoalCheck, *, has_heading: bool = False) -> tuple[str, NextStep]:
+    """Return where the robot could drive instead of a refused goal, and the next step.
+
+    Args:
+        has_heading: The heading was asked for, so it is said too.
+    """
+    near = check.nearest
+    if near is None:
+        return "No place near it works either.", NextStep.CHOOSE_ON_MAP
+    heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
+    hint = f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}."
+    return hint, NextStep.DRIVE_THERE
 
 
 def say_check(check: GoalCheck) -> str:

@@ -27,6 +27,7 @@ ORDERED = re.compile(
     r"(?:\s+(?:to|from)\s+(?P<to>.+))?\s*",
     re.IGNORECASE | re.DOTALL,
 )
+THING_ID = re.compile(r"[Tt]\d+")
 ARTICLE = re.compile(r"(?:the|an?|any|some)\s+", re.IGNORECASE)
 IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNORECASE | re.DOTALL)
 
@@ -109,7 +110,10 @@ def list_alike(world: WorldModel, words: str) -> list[RememberedThing]:
 
 
 def find_things(world: WorldModel, words: str) -> list[RememberedThing]:
-    """Return all things that are called so: "ladder", or "ladder in R2"."""
+    """Return all things that are called so: "T3", "ladder", or "ladder in R2"."""
+    if THING_ID.fullmatch(words.strip()):
+        found = world.recollection.find_thing(words.strip().upper())
+        return [] if found is None else [found]
     label, room_id = split_room(world, words)
     return [
         each

@@ -137,9 +137,6 @@ class _Wish:
     """What a client asked for.
 
     Attributes:
-        id: What an operator calls it.
-        wanted: What for.
-        client: Who asked.
         asked_s: When, by the same clock as all times here.
         secret: What an answer of that client must know, beside the id.
     """
@@ -153,11 +150,7 @@ class _Wish:
 
 @dataclass(frozen=True, slots=True)
 class WaitingRoom:
-    """A folder in which a server writes what waits, and an operator what is approved.
-
-    Attributes:
-        folder: Shared by servers and operators.
-    """
+    """A folder in which a server writes what waits, and an operator what is approved."""
 
     folder: Path
 
@@ -228,7 +221,6 @@ class Approvals:
     """What waits for a person's word in one server.
 
     Attributes:
-        room: Where it waits for `mapspeak approve`.
         now_s: Seconds that only grow.
     """
 

@@ -24,7 +24,6 @@ class Caller:
 
     Attributes:
         client: The client's session; empty where mapspeak acts by itself.
-        tool: The tool it called.
         session: The client's HTTP session; empty on stdio and for clients without one.
     """
 
@@ -67,15 +66,9 @@ class AuditLine:
         run: Which run of which server wrote it.
         robot: Which one it is about, where a server has several.
         wall_time: ISO 8601, by the operator's clock.
-        robot_s: Robot time.
         event: "decision", "result", "leg", "ended", "stop", "release", "approval" or "memory".
-        client: Who wanted it.
-        tool: By which tool.
-        kind: Of command; empty for other lines.
-        what: In words.
         verdict: "allowed", "refused" or "needs approval"; empty if nothing was decided.
         said: Why, or with what result.
-        details: The command's own values.
     """
 
     number: int

@@ -33,7 +33,6 @@ class DriveCommand:
     """Drives somewhere by the robot's own navigation.
 
     Attributes:
-        goal: Where to.
         check: What the map says of it, closed areas included.
     """
 
@@ -44,13 +43,7 @@ class DriveCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Publish:
-    """Publishes one message.
-
-    Attributes:
-        topic: Such as "/cmd_vel".
-        type: Such as "geometry_msgs/msg/Twist".
-        message: Its fields.
-    """
+    """Publishes one message."""
 
     topic: str
     type: str
@@ -60,13 +53,7 @@ class Publish:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Call:
-    """Calls a service.
-
-    Attributes:
-        service: Its name.
-        type: Its type.
-        arguments: Of the request.
-    """
+    """Calls a service."""
 
     service: str
     type: str
@@ -79,9 +66,7 @@ class Act:
     """Sends a goal to an action.
 
     Attributes:
-        action: Its name.
         type: Its type, as the caller says.
-        goal: The goal's fields.
         true_type: Its type, as the robot says; empty when the robot does not tell it.
     """
 
@@ -98,8 +83,6 @@ class SetParameter:
 
     Attributes:
         node: Whose; empty in ROS 1.
-        name: Which.
-        value: To what.
     """
 
     node: str
@@ -118,8 +101,6 @@ class RunSkill:
     """Runs a skill of the robot, or a mission.
 
     Attributes:
-        skill: Its name.
-        arguments: What it is given.
         needs_word: A person has to agree, whatever the policy says.
     """
 

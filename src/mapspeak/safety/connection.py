@@ -44,16 +44,13 @@ HARMLESS = frozenset(
         *("fetch_action_type", "fetch_definitions", "fetch_parameter_names", "fetch_parameter"),
     }
 )
-"""Members of the port that are passed on; a new one is refused until it is guarded or named here."""
+"""Members that are passed on; a new one is refused until it is guarded or named here."""
 
 
 class GuardedConnection:
     """A `RosConnection` that changes only what its policy allows; stopping always passes.
 
     Args:
-        connection: The connection itself.
-        guard: Decides and notes.
-        now_s: Robot time.
         by_hand: Knows where velocities would take the robot; None where nothing is closed.
         planner: Checks the poses of goals against the map; None for no check.
     """

@@ -9,7 +9,7 @@ from typing import Any
 from mapspeak.errors import GoalError, NextStep, PolicyError
 from mapspeak.hold import say_hold
 from mapspeak.installation import shell_command
-from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check, say_instead
 from mapspeak.ros.messages.fields import bare_type
 from mapspeak.safety.commands import (
     Act,
@@ -53,11 +53,7 @@ class Refused:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NeedsApproval:
-    """A person has to agree first.
-
-    Attributes:
-        question: What to ask.
-    """
+    """A person has to agree first."""
 
     question: str
 
@@ -174,12 +170,10 @@ def judge_check(check: GoalCheck, policy: Policy) -> Refused | None:
     """Return what is against a goal by what the map says of it; None when nothing is."""
     always = (GoalVerdict.NOT_FINITE, GoalVerdict.CLOSED)
     if not check.is_ok and (policy.needs_known_way or check.verdict in always):
-        near = check.nearest
-        if near is not None:
-            hint = f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}."
-            return refuse(say_check(check), rule="goals", hint=hint)
-        hint = "No place near it works either."
-        return refuse(say_check(check), rule="goals", hint=hint, step=NextStep.CHOOSE_ON_MAP)
+        hint, step = say_instead(check)
+        # Not every command drives by goals of ours: only the lack of one says what to do next.
+        needed = step if check.nearest is None else None
+        return refuse(say_check(check), rule="goals", hint=hint, step=needed)
     if check.path_m is not None and check.path_m > policy.farthest_m:
         return refuse(
             f"The goal is {check.path_m:.1f} m away, the policy allows {policy.farthest_m:.1f} m.",
@@ -220,7 +214,7 @@ def find_speeds(value: object, depth: int = 0) -> Iterator[tuple[str, float]]:
             if key in ("linear", "angular") and isinstance(inner, Mapping):
                 yield key, _length_of(inner)
             elif key == "speed":
-                yield key, abs(_number(inner))
+                yield key, abs(read_number(inner))
             else:
                 yield from find_speeds(inner, depth + 1)
     elif isinstance(value, (list, tuple)):
@@ -229,10 +223,10 @@ def find_speeds(value: object, depth: int = 0) -> Iterator[tuple[str, float]]:
 
 
 def _length_of(vector: Mapping[str, Any]) -> float:
-    return math.sqrt(sum(_number(part) ** 2 for part in vector.values()))
+    return math.sqrt(sum(read_number(part) ** 2 for part in vector.values()))
 
 
-def _number(value: object) -> float:
+def read_number(value: object) -> float:
     """Return a finite number as it is, and anything else as NaN."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     try:

@@ -186,7 +186,6 @@ class ApprovalNeededError(PolicyError):
     """A person has to agree first.
 
     Attributes:
-        question: What to ask.
         wish_id: What to grant when the person agrees.
     """
 
@@ -202,8 +201,6 @@ class Permit:
 
     Attributes:
         number: Of the command in the audit log.
-        command: The command.
-        caller: Who gave it.
         by: The person's word for it; empty where none was needed.
     """
 
@@ -218,10 +215,7 @@ class Guard:
     """Holds commands to a policy; every wrapper of a port asks the same one.
 
     Attributes:
-        policy: What commands are held to.
-        audit: Where all of them are noted.
         hold: What keeps the robot standing.
-        approvals: What waits for a person's word.
         wall_clock: The operator's.
         robot: What the operator calls it; empty leaves that to the robot.
         address: Where the robot is; empty for one that no other process can reach.
@@ -251,8 +245,6 @@ class Guard:
         """Allow a command, and note that; between this and the command nothing may wait.
 
         Args:
-            command: What is wanted.
-            robot_s: Robot time.
             objection: What is against it by where it leads.
 
         Raises:

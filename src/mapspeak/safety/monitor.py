@@ -47,12 +47,7 @@ AT_AREA = {
 
 
 class GoalMonitor:
-    """Watches whether a drive's goal still is one; it only judges what it is told.
-
-    Args:
-        goal: Where the drive leads.
-        radius_m: Of the robot.
-    """
+    """Watches whether a drive's goal still is one; it only judges what it is told."""
 
     def __init__(self, *, goal: Pose, radius_m: float) -> None:
         self._goal = goal
@@ -131,7 +126,7 @@ class KeepOutMonitor:
         further_m = speed_mps * (passed_s + REACTION_S + speed_mps / (2 * BRAKING_MPS2))
         turned_rad = _find_turn(then, here)
         heading_rad = then.point.bearing_to(here.point) + turned_rad / 2
-        return _follow_arc(here.point, heading_rad, turned_rad / moved_m, further_m)
+        return follow_arc(here.point, heading_rad, turned_rad / moved_m, further_m, n_steps=N_STEPS)
 
 
 def find_entered(
@@ -159,13 +154,13 @@ def _find_turn(then: Pose, here: Pose) -> float:
     return min(max(2 * off_rad, low), high)
 
 
-def _follow_arc(
-    start: Point, heading_rad: float, curvature_radpm: float, length_m: float
+def follow_arc(
+    start: Point, heading_rad: float, curvature_radpm: float, length_m: float, *, n_steps: int
 ) -> tuple[Point, ...]:
-    """Return places along a way that goes on turning as it did."""
-    step_m = length_m / N_STEPS
+    """Return points along an arc, without its start."""
+    step_m = length_m / n_steps
     points = [start]
-    for number in range(N_STEPS):
+    for number in range(n_steps):
         toward_rad = heading_rad + curvature_radpm * step_m * (number + 0.5)
         last = points[-1]
         points.append(
@@ -182,11 +177,7 @@ LOOK_S = 1.0
 
 
 class StandingCheck:
-    """Compares where a robot is with where it was at the look before.
-
-    Args:
-        robot: The robot.
-    """
+    """Compares where a robot is with where it was at the look before."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -227,8 +218,6 @@ class HoldKeeper:
     """Obeys a hold, and tells the operator what came of it.
 
     Args:
-        hold: What may keep the robot standing.
-        standing: Knows whether it stands.
         repeat_s: Between two looks whether it does, in wall time.
     """
 

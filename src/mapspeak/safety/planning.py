@@ -12,7 +12,7 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
 from mapspeak.robot import Robot
-from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, refuse
+from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, read_number, refuse
 from mapspeak.safety.guard import Permit, Surveyor
 from mapspeak.safety.monitor import KEEP_M, GoalMonitor
 from mapspeak.safety.policy import Policy
@@ -148,9 +148,6 @@ class GuardedDrive:
     Attributes:
         goal_id: The id it is known by: that of its first leg.
         leg_id: What the robot calls the leg that it drives now.
-        legs: Those after it.
-        permit: By which it was allowed.
-        goal_monitor: Watches its goal.
     """
 
     goal_id: str
@@ -183,9 +180,7 @@ class Plan:
     """How the robot would get to a goal.
 
     Attributes:
-        check: What the map says of the goal.
         legs: The poses to send it to, the goal last.
-        here: Where it is.
     """
 
     check: GoalCheck
@@ -194,13 +189,7 @@ class Plan:
 
 
 class Planner:
-    """Checks goals against the map, and plans the legs to them.
-
-    Args:
-        robot: The robot itself.
-        surveyor: Knows what is closed now.
-        policy: What goals are held to.
-    """
+    """Checks goals against the map, and plans the legs to them."""
 
     def __init__(self, robot: Robot, *, surveyor: Surveyor, policy: Policy) -> None:
         self._robot = robot
@@ -327,12 +316,7 @@ def _read_yaw(message: Message) -> float:
 
 
 def _number(message: Message, name: str) -> float:
-    value = message.get(name, 0.0)
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    try:
-        return float(value) if is_number else math.nan
-    except OverflowError:
-        return math.inf
+    return read_number(message.get(name, 0.0))
 
 
 def _refuse_frame(frame: str, map_frame: str) -> Refused:

@@ -98,7 +98,6 @@ class Hours:
     """A time of day, by the operator's wall clock; over midnight where it ends before it begins.
 
     Attributes:
-        begins: The first moment.
         ends: The first moment after; midnight for the end of the day.
         days: On which it begins, 0 for Monday.
     """
@@ -124,7 +123,6 @@ class AreaRule:
     """A part of the floor that is closed: always, or at some hours.
 
     Attributes:
-        name: What people call it.
         outline: Its corners in order; empty where it is a region.
         further_outlines: Of other parts and of holes, as a mask has them.
         region_id: Of the room or corridor that it is, such as "C1"; empty where it has an outline.
@@ -146,7 +144,6 @@ class Denial:
 
     Attributes:
         key: Of the rule, below that of the kind of command.
-        patterns: What is written there.
     """
 
     key: str
@@ -211,7 +208,6 @@ class Approval:
     """What a person must agree to.
 
     Attributes:
-        kinds: Of commands.
         otherwise: What becomes of them where the client cannot ask.
     """
 
@@ -253,13 +249,10 @@ class Policy:
         is_read_only: Nothing moves and nothing changes; stopping stays.
         latches_on_stop: After a client's stop only a person releases the robot.
         when_busy: What becomes of a drive while another one is under way.
-        speeds: Of published velocities.
         needs_known_way: Goals only where a known way leads.
         clearance_m: What the robot's edge keeps from obstacles, at goals and on ways.
         farthest_m: The longest way to a goal.
-        areas: Closed parts of the floor.
         patterns: For the names of topics, services, actions and parameters.
-        approval: What a person must agree to.
         rates: Commands of each kind in any minute of robot time.
     """
 

@@ -46,13 +46,7 @@ class GuardedRobot:
 
     Args:
         robot: The robot itself; it must not be shared.
-        guard: Decides and notes.
-        surveyor: Knows what is closed now.
         repeat_s: Between two looks whether a held robot stands, in wall time.
-
-    Attributes:
-        planner: Checks goals, and plans the legs to them.
-        by_hand: Knows the velocities that were published.
     """
 
     def __init__(

@@ -14,7 +14,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Robot
 from mapspeak.safety.deciding import Refused, find_speeds, refuse
 from mapspeak.safety.guard import Surveyor
-from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
+from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered, follow_arc
 from mapspeak.safety.planning import Planner
 
 LEAST_S = 0.5
@@ -59,13 +59,7 @@ class Velocity:
 
 
 class HandDriving:
-    """Knows the velocities that were published, and judges those that are to be.
-
-    Args:
-        robot: The robot itself.
-        planner: Surveys the map.
-        surveyor: Knows what is closed now.
-    """
+    """Knows the velocities that were published, and judges those that are to be."""
 
     def __init__(self, robot: Robot, *, planner: Planner, surveyor: Surveyor) -> None:
         self._robot = robot
@@ -102,12 +96,7 @@ class HandDriving:
         return self._find_objection(message, here)
 
     def begin(self, topic: str, *, publish_zero: Callable[[], object]) -> None:
-        """Note that a velocity was let go.
-
-        Args:
-            topic: Where it was published.
-            publish_zero: Publishes zero velocity there.
-        """
+        """Note that a velocity was let go."""
         self._zeros[topic] = publish_zero
         self._moving.add(topic)
 
@@ -217,20 +206,12 @@ def _reach_m(speed_mps: float, lasts_s: float) -> float:
 
 
 def _predict(here: Pose, velocity: Velocity, lasts_s: float) -> tuple[Point, ...]:
-    """Return places along the way to the stand, with the velocity held until it brakes."""
+    """Return points on the way until the robot stands, the velocity held until it brakes."""
     speed_mps = velocity.speed_mps
     if speed_mps == 0.0:
         return ()
     length_m = _reach_m(speed_mps, lasts_s)
     n_steps = min(math.ceil(length_m / STEP_M), MOST_STEPS)
-    step_m = length_m / n_steps
-    turn_rad = velocity.turn_radps * step_m / speed_mps
     heading_rad = here.yaw_rad + math.atan2(velocity.left_mps, velocity.forward_mps)
-    points = [here.point]
-    for number in range(n_steps):
-        toward_rad = heading_rad + turn_rad * (number + 0.5)
-        last = points[-1]
-        points.append(
-            Point(last.x + step_m * math.cos(toward_rad), last.y + step_m * math.sin(toward_rad))
-        )
-    return tuple(points[1:])
+    curvature_radpm = velocity.turn_radps / speed_mps
+    return follow_arc(here.point, heading_rad, curvature_radpm, length_m, n_steps=n_steps)

@@ -58,8 +58,6 @@ class MapspeakServer(MCPServer[Any]):
     """An MCP server with one entry for every call: it notes the client and makes errors readable.
 
     Args:
-        session: The session of the tools.
-        runs: The runs of its skills.
         instructions: The text that a model reads before its first call.
         call_log: Where every call is noted; None for nowhere.
 

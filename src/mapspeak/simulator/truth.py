@@ -210,9 +210,7 @@ def is_in_sight(
     What hangs on a wall is hidden from everywhere behind that wall.
 
     Args:
-        world: The world that holds the thing.
         place: In the world's own frame.
-        thing: The thing looked for.
         hiding: The world sliced at eye level, if available; else it is sliced here.
     """
     if find_kind(thing.kind).is_wall_hung and thing.pose.inverse().transform(place).x <= 0:

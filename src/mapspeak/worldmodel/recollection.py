@@ -64,7 +64,6 @@ class Recollection:
     """All that is remembered, on one map; compared by identity.
 
     Args:
-        found: The things made of them.
         things: The same under their ids, in the order of these.
         n_named: How many ids were ever given.
         find_vectors: Find what compares meanings, or None.
@@ -281,8 +280,6 @@ def number_things(
     """Return things under the ids that they had before, and new things under new ones.
 
     Args:
-        things: What is remembered now.
-        earlier: What was, with ids.
         n_named: How many ids were ever given; a thing that is gone leaves its id unused.
 
     Returns:

@@ -54,7 +54,6 @@ class Transcript(Witness):
     Args:
         limits: What it may cost; wall time is watched from outside.
         look: Return how the simulation truly stands.
-        on_turn: Told of every turn.
     """
 
     def __init__(

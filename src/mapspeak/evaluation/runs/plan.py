@@ -28,7 +28,6 @@ class RunOptions:
     """Options of an evaluation.
 
     Attributes:
-        tasks: Names of tasks or of their groups.
         worlds: Names, paths, or "all" for the shipped ones.
         n_trials: Per task and world; a world is explored once.
         seed: Of the first trial; each further one has the next.

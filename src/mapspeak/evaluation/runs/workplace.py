@@ -46,7 +46,6 @@ class TrialSetup:
     Attributes:
         world: The world of the trial, without additions of the setting.
         known_map: A finished map (.yaml) for the robot; None without one.
-        folder: The trial's.
         control: Where the robot is held and released.
         view: Address of a live page, if the server runs as a program; None for no page.
     """

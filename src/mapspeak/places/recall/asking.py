@@ -101,7 +101,6 @@ class Recall:
 
     Attributes:
         query: The request; a room that its words named is a filter.
-        answer: What the search found among all that passes the filters.
         candidates: The likeliest first; of equally likely ones the nearest by path. Where nothing
             is remembered they are the nearest in meaning, and probably none is meant.
         n_searched: How many places and things pass the filters.

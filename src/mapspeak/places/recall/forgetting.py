@@ -5,8 +5,7 @@ from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore
 from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_views, view_of
 from mapspeak.places.naming import AmbiguousPlaceError
-from mapspeak.places.recall.nearby import THING_ID
-from mapspeak.places.things import find_things
+from mapspeak.places.things import THING_ID, find_things
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
@@ -27,7 +26,7 @@ def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:
     place = _find_place(world, words)
     if place is not None:
         return forget_place(store, place.waypoint.name)
-    called = _find_things(world, words)
+    called = find_things(world, words)
     if not called:
         raise SemanticMapError(
             f"Nothing is remembered as {words[:80]!r}.", hint="Give its id, such as T4 or W2."
@@ -45,7 +44,7 @@ def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:
 
 def find_gone(world: WorldModel, words: str, here: Point) -> list[RememberedThing]:
     """Return the things that somebody means who says, looking from a point, that it is gone."""
-    called = _find_things(world, words)
+    called = find_things(world, words)
     if THING_ID.fullmatch(words.strip()):
         return called
     return [
@@ -71,10 +70,3 @@ def _find_place(world: WorldModel, words: str) -> RememberedPlace | None:
         ),
         None,
     )
-
-
-def _find_things(world: WorldModel, words: str) -> list[RememberedThing]:
-    if THING_ID.fullmatch(words.strip()):
-        found = world.recollection.find_thing(words.strip().upper())
-        return [] if found is None else [found]
-    return find_things(world, words)

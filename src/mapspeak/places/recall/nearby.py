@@ -1,16 +1,14 @@
 """What is remembered nearest to a thing: by where things are, not where they were seen from."""
 
-import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from mapspeak.places.naming import no_such_place
 from mapspeak.places.recall.asking import last_seen
-from mapspeak.places.things import find_things
+from mapspeak.places.things import THING_ID, find_things
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
 
-THING_ID = re.compile(r"[Tt]\d+")
 NEVER = datetime.min.replace(tzinfo=UTC)
 
 
@@ -61,10 +59,7 @@ def find_nearby(
 
 def _find_called(world: WorldModel, words: str) -> list[RememberedThing]:
     """Return the things of a name or an id, those seen last first."""
-    if THING_ID.fullmatch(words):
-        found = world.recollection.find_thing(words.upper())
-        if found is None:
-            raise no_such_place(world, words)
-        return [found]
     called = find_things(world, words)
+    if not called and THING_ID.fullmatch(words):
+        raise no_such_place(world, words)
     return sorted(called, key=lambda each: last_seen(world, each) or NEVER, reverse=True)

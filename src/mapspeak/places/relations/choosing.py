@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from mapspeak.errors import GoalError, NextStep
+from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.places.goalcheck import GoalCheck, check_goal, say_refusal
+from mapspeak.places.goalcheck import GoalCheck, check_goal, say_instead, say_refusal
 from mapspeak.places.naming import Place, Spot, find_named, is_taken_name, no_such_place, say_spot
 from mapspeak.places.relations.relating import find_related, find_several_related
 from mapspeak.places.standing import (
@@ -125,7 +125,7 @@ def choose_goal(
         goal = check_place(world, instead, yaw_deg=yaw_deg)
     if not goal.check.is_ok:
         has_heading = yaw_deg is not None or _has_heading(meant)
-        hint, step = _what_instead(goal.check, has_heading=has_heading)
+        hint, step = say_instead(goal.check, has_heading=has_heading)
         raise GoalError(say_refusal(goal.name, goal.check), hint=hint, step=step)
     return goal
 
@@ -195,12 +195,3 @@ def stand_at(world: WorldModel, place: Place) -> Pose:
         case Spot(point=point, yaw_rad=yaw_rad):
             straight_on = arrival_pose(world, point)
             return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)
-
-
-def _what_instead(check: GoalCheck, *, has_heading: bool) -> tuple[str, NextStep]:
-    if check.nearest is None:
-        return "No place near it works either.", NextStep.CHOOSE_ON_MAP
-    near = check.nearest
-    heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
-    hint = f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}."
-    return hint, NextStep.DRIVE_THERE

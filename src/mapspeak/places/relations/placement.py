@@ -26,7 +26,6 @@ class ReachableCells:
 
     Attributes:
         points: Their centres in metres, shape (n, 2).
-        paths_m: How far the robot has to drive to each.
         clear_m: From each to the nearest obstacle.
         regions: The index of the region each lies in; 0 in none.
         in_doors: True in the middle of a door, where a robot is in the way.

@@ -1,11 +1,10 @@
-"""Drawn surfaces: signs, goods, devices, floor and walls, drawn with Pillow when asked for.
+"""Drawn surfaces: signs, goods, devices, floor and walls, and the atlas that holds them.
 
-`textures.json` lists the shapes of those that are drawn; the signs follow the idea of ISO 7010: red
-for fire equipment, green for escape and first aid. What is grain alone is computed here. An
-atlas is one large picture that holds many of them, each at several sizes (mip levels).
+The folder `surfaces` holds what `tools/worldgen/surfaces.py` has drawn; the signs follow the idea
+of ISO 7010: red for fire equipment, green for escape and first aid. Grain is computed here. An
+atlas is one large picture that holds many surfaces, each at several sizes (mip levels).
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,16 +14,14 @@ from typing import Any
 
 import cv2
 import numpy as np
-import orjson
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
-from mapspeak.simulator.worlds.models import Colour, Surface
+from mapspeak.simulator.worlds.models import Surface
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 Picture = NDArray[np.uint8]
-Place = tuple[float, float]
 
 TILED = frozenset({Surface.FLOOR, Surface.WALL, Surface.CEILING})
 """Surfaces that repeat without a seam beyond 0..1; all others are drawn once."""
@@ -34,7 +31,6 @@ GLOWING = frozenset(
 )
 """Surfaces that shine by themselves."""
 
-_SMOOTHING = 3
 _SEED = 7
 
 
@@ -44,109 +40,19 @@ def draw(surface: Surface) -> Picture:
     if surface in _COMPUTED:
         values = _COMPUTED[surface]()
     elif surface in _GRAINS:
-        values = _draw_shapes(surface) + _GRAINS[surface]()
+        values = _read_drawn(surface) + _GRAINS[surface]()
     else:
-        values = _draw_shapes(surface).astype(np.float64)
+        values = _read_drawn(surface).astype(np.float64)
     picture = np.clip(values, 0, 255).astype(np.uint8)
     picture.setflags(write=False)
     return picture
 
 
-# --- drawn -----------------------------------------------------------------------------------
-
-
-class _Canvas:
-    """A picture in the making: x to the right and y down, 100 units high, with smooth edges."""
-
-    def __init__(self, width_px: int, height_px: int, background: Colour) -> None:
-        self._size = (width_px, height_px)
-        self._scale = _SMOOTHING * height_px / 100.0
-        large = (width_px * _SMOOTHING, height_px * _SMOOTHING)
-        self._image = Image.new("RGB", large, background)
-        self._draw = ImageDraw.Draw(self._image)
-
-    def polygon(self, *, points: Sequence[Place], fill: Colour) -> None:
-        """Fill a polygon."""
-        self._draw.polygon([self._place(point) for point in points], fill=fill)
-
-    def rectangle(self, *, low: Place, high: Place, fill: Colour, rounding: float = 0.0) -> None:
-        """Fill a rectangle between its upper left and its lower right corner."""
-        self._draw.rounded_rectangle(
-            [self._place(low), self._place(high)], radius=rounding * self._scale, fill=fill
-        )
-
-    def disc(self, *, centre: Place, radius: float, fill: Colour) -> None:
-        """Fill a circle."""
-        self._draw.circle(self._place(centre), radius * self._scale, fill=fill)
-
-    def line(self, *, points: Sequence[Place], width: float, fill: Colour) -> None:
-        """Draw a line with round ends and joints."""
-        pixels = round(width * self._scale)
-        self._draw.line([self._place(point) for point in points], fill=fill, width=pixels)
-        for point in points:
-            self.disc(centre=point, radius=width / 2, fill=fill)
-
-    def arc(
-        self, *, centre: Place, radius: float, turn_deg: Place, stroke: float, fill: Colour
-    ) -> None:
-        """Draw part of a circle, from one angle to the other; 0 is right, 90 is down."""
-        n = max(int(abs(turn_deg[1] - turn_deg[0]) / 6), 2)
-        angles = [
-            math.radians(turn_deg[0] + (turn_deg[1] - turn_deg[0]) * i / n) for i in range(n + 1)
-        ]
-        x, y = centre
-        points = [(x + radius * math.cos(angle), y + radius * math.sin(angle)) for angle in angles]
-        self.line(points=points, width=stroke, fill=fill)
-
-    def text(self, *, centre: Place, words: str, height: float, fill: Colour) -> None:
-        """Write words around a centre."""
-        self._draw.text(
-            self._place(centre),
-            words,
-            fill=fill,
-            font=ImageFont.load_default(size=height * self._scale),
-            anchor="mm",
-            stroke_width=height * self._scale / 28,
-            stroke_fill=fill,
-        )
-
-    def finish(self) -> Picture:
-        """Return the picture, shape (height, width, 3)."""
-        return np.asarray(self._image.resize(self._size, Image.Resampling.BOX))
-
-    def _place(self, point: Place) -> Place:
-        return (point[0] * self._scale, point[1] * self._scale)
-
-
-_SHAPES: Mapping[str, Callable[..., None]] = MappingProxyType(
-    {
-        "arc": _Canvas.arc,
-        "disc": _Canvas.disc,
-        "line": _Canvas.line,
-        "polygon": _Canvas.polygon,
-        "rectangle": _Canvas.rectangle,
-        "text": _Canvas.text,
-    }
-)
-
-
-def _draw_shapes(surface: Surface) -> Picture:
-    """Draw the shapes that the file lists, each over those before it."""
-    drawing = _read_drawings()[surface]
-    width_px, height_px = drawing["size_px"]
-    canvas = _Canvas(width_px, height_px, tuple(drawing["background"]))
-    for shape in drawing["shapes"]:
-        arguments = dict(shape)
-        arguments["fill"] = tuple(arguments["fill"])
-        _SHAPES[arguments.pop("shape")](canvas, **arguments)
-    return canvas.finish()
-
-
-@cache
-def _read_drawings() -> Mapping[str, Any]:
-    """Read all drawings by their surface; the reader must not change anything in them."""
-    text = resources.files("mapspeak.simulator.camera").joinpath("textures.json").read_bytes()
-    return MappingProxyType(orjson.loads(text))
+def _read_drawn(surface: Surface) -> Picture:
+    """Return what is drawn of a surface, shape (height, width, 3)."""
+    folder = resources.files("mapspeak.simulator.camera").joinpath("surfaces")
+    with folder.joinpath(f"{surface}.png").open("rb") as file:
+        return np.asarray(Image.open(file).convert("RGB"))
 
 
 # --- computed --------------------------------------------------------------------------------

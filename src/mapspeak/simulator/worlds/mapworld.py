@@ -25,8 +25,6 @@ def build_map_world(grid: OccupancyGrid, *, name: str, start: Pose | None = None
     """Build a world whose floor is that of a map; its frame is the map's.
 
     Args:
-        grid: The map.
-        name: What the world is called.
         start: Where the robot stands at first; None for where it has most room.
 
     Raises:

@@ -107,7 +107,6 @@ class World:
     """Everything that is true of a world. Scoring may read it; tools never do.
 
     Attributes:
-        name: Such as "warehouse".
         start: Where the robot stands at first, in the world's own frame.
         battery_ratio: How full its battery is then.
         n_faults: How often each of its skills fails before it works, by name.

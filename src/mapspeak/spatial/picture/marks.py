@@ -199,7 +199,6 @@ class PictureRegion:
 
     Attributes:
         label: The number its cells carry in the layer's array.
-        text: What is written in it; empty for none.
         colour: Of its pale fill; None for one that differs from the neighbours'.
         is_hatched: Its fill has diagonal lines.
         is_highlighted: It has a bold outline, for the one region that a picture is about.
@@ -252,7 +251,6 @@ class LegendEntry:
     """One symbol of a picture and what it stands for.
 
     Attributes:
-        text: Its meaning in a word or two.
         colour: Only for marks and lines of this colour; None for those of any.
     """
 

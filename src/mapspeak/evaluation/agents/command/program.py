@@ -47,7 +47,6 @@ class Program(BaseModel):
     server's program, quoted) and {arguments} (its arguments as a JSON list) are filled in.
 
     Attributes:
-        command: The program and its arguments.
         thinking: Further arguments if a level of thinking is set; empty if not supported.
         config: File in its folder that names the server, in the usual `mcpServers` JSON.
         server: Further fields of the server in that JSON.

@@ -32,7 +32,6 @@ def decide(seed: int, *, prompt: str, heard: Sequence[str], tools: Collection[st
     """Return the mock's next reply: it looks, errs once, drives a little, and answers.
 
     Args:
-        seed: For its random draws.
         heard: The answers to its calls so far, in order.
     """
     is_question = "Answer without driving" in prompt
