@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import anyio
 import anyio.to_thread
@@ -33,7 +33,7 @@ from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
 from mapspeak.ros.port import RosConnection, started_over
-from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
+from mapspeak.safety import Guard, GuardedRobot, Surveyor, WhenBusy, guard_connection
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
@@ -97,15 +97,13 @@ class Session:
             self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
             when_busy = guard.policy.when_busy
             if ros is not None:
-                guarded = GuardedConnection(
+                ros = guard_connection(
                     ros,
                     guard=guard,
                     now_s=lambda: robot.now_s,
                     by_hand=self._guarded.by_hand,
                     planner=self._guarded.planner,
                 )
-                # What it does not guard, it passes on by name.
-                ros = cast("RosConnection", guarded)
         self.ros, self.skilled = ros, skilled
         self.robot: Robot = self._guarded or robot
         name_robot, lock = lambda: robot.description.name, threading.RLock()

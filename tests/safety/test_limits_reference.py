@@ -4,7 +4,8 @@ import dataclasses
 import re
 from pathlib import Path
 
-from mapspeak.safety import Policy, load_policy
+from mapspeak.safety import Policy
+from mapspeak.safety.policyfile import load_policy
 from mapspeak.safety.policyfile import _PolicyFile
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "limits.md"

@@ -28,7 +28,7 @@ from mapspeak.safety.commands import (
     SetParameter,
     say_command,
 )
-from mapspeak.safety.connection import GuardedConnection
+from mapspeak.safety.connection import GuardedConnection, guard_connection
 from mapspeak.safety.deciding import (
     Allowed,
     Decision,
@@ -48,7 +48,6 @@ from mapspeak.safety.policy import (
     Speeds,
     WhenBusy,
 )
-from mapspeak.safety.policyfile import load_policy
 from mapspeak.safety.robot import GuardedRobot
 from mapspeak.safety.velocities import HandDriving, publishing_for, zero_velocity_of
 
@@ -93,7 +92,7 @@ __all__ = [
     "covered_by",
     "current_caller",
     "decide",
-    "load_policy",
+    "guard_connection",
     "publishing_for",
     "read_audit",
     "say_command",

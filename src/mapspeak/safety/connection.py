@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal
@@ -257,6 +257,21 @@ class GuardedConnection:
         if name not in HARMLESS:
             raise AttributeError(name)
         return getattr(self._connection, name)
+
+
+def guard_connection(
+    connection: RosConnection,
+    *,
+    guard: Guard,
+    now_s: Callable[[], float],
+    by_hand: HandDriving,
+    planner: Planner,
+) -> RosConnection:
+    """Return a connection behind the guard, whose other members are passed on by name."""
+    guarded = GuardedConnection(
+        connection, guard=guard, now_s=now_s, by_hand=by_hand, planner=planner
+    )
+    return cast("RosConnection", guarded)
 
 
 def _is_stop(command: Publish | Call) -> bool:

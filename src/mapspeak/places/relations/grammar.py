@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 from mapspeak.places.relations.vocabulary import (
     COUNT,
@@ -191,7 +192,7 @@ def parse_relation(words: str) -> Relation | None:
     if len(words) > LONGEST:
         return None
     wanted = plain(VERB.sub("", words, count=1))
-    for form, read in FORMS:
+    for form, read in _forms():
         match = form.fullmatch(wanted)
         relation = None if match is None else read(match)
         if relation is not None:
@@ -269,60 +270,60 @@ ALL = r"(?:all|every|each)(?: of)?(?: the)?"
 TOWARDS = r"(?:at|through|to|towards)"
 LOOKING = rf"(?:facing|looking (?:back )?{TOWARDS})"
 ITS_DOOR = r"(?:its (?:own )?|the )(?:door|doorway)"
-FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
+FORMS: tuple[tuple[str, Read], ...] = (
     (
-        pattern(
+        (
             rf"(?P<place>.+?),? (?:(?:facing|look(?:ing)?) back(?: {TOWARDS} {ITS_DOOR})?"
             rf"|{LOOKING} its (?:own )?(?:door|doorway))"
         ),
         lambda m: Turned(m["place"].rstrip(","), None),
     ),
     (
-        pattern(rf"(?P<place>.+),? {LOOKING} (?P<to>.+)"),
+        rf"(?P<place>.+),? {LOOKING} (?P<to>.+)",
         lambda m: Turned(m["place"].rstrip(","), m["to"]),
     ),
     *(
-        (pattern(rf"{AWAY}{words}{OPEN}(?P<of>.+?){SEEN}"), _read_side(side))
+        (rf"{AWAY}{words}{OPEN}(?P<of>.+?){SEEN}", _read_side(side))
         for side, words in SIDES.items()
     ),
-    (pattern(rf"{AWAY}{BESIDE}{COMPASS} of{OPEN}(?P<of>.+)"), _read_compass),
-    (pattern(rf"(?:at )?{DISTANCE} (?:away )?from{OPEN}(?P<of>.+)"), _read_away),
-    (pattern(rf"(?:in )?between{OPEN}(?P<of>.+)"), _read_between),
+    (rf"{AWAY}{BESIDE}{COMPASS} of{OPEN}(?P<of>.+)", _read_compass),
+    (rf"(?:at )?{DISTANCE} (?:away )?from{OPEN}(?P<of>.+)", _read_away),
+    (rf"(?:in )?between{OPEN}(?P<of>.+)", _read_between),
     (
-        pattern(
+        (
             rf"{AT}(?:nearest |closest )?(?:{COMPASS} )?corner(?: (?:of|in) (?P<of>.+?))?"
             rf"(?: {BY} (?P<near>.+))?"
         ),
         lambda m: Corner(of=m["of"], compass=read_compass(m["compass"]), near=m["near"]),
     ),
     (
-        pattern(
+        (
             rf"(?:(?P<along>along|at|by|next to|beside|near|facing) )?{THE}"
             rf"(?:nearest |closest )?(?:{COMPASS} )?wall (?:of|in) (?P<of>.+)"
         ),
         _read_wall,
     ),
-    (pattern(rf"{AT}(?:middle|cent(?:er|re)) of{OPEN}(?P<of>.+)"), lambda m: Middle(m["of"])),
+    (rf"{AT}(?:middle|cent(?:er|re)) of{OPEN}(?P<of>.+)", lambda m: Middle(m["of"])),
     *(
         (
-            pattern(rf"{AT}{RANK}{ORDER} (?:{words})(?: (?:to|from) (?P<to>.+))?"),
+            rf"{AT}{RANK}{ORDER} (?:{words})(?: (?:to|from) (?P<to>.+))?",
             _read_superlative(kind),
         )
         for kind, words in KINDS.items()
     ),
     *(
         (
-            pattern(rf"{THE}{COUNT} {ORDER} (?:{words})s?(?: (?:to|from) (?P<at>.+))?"),
+            rf"{THE}{COUNT} {ORDER} (?:{words})s?(?: (?:to|from) (?P<at>.+))?",
             _read_some(kind),
         )
         for kind, words in KINDS.items()
     ),
     *(
-        (pattern(rf"{ALL} (?:{words})s?(?: (?:of|in) (?P<at>.+))?"), _read_all(kind))
+        (rf"{ALL} (?:{words})s?(?: (?:of|in) (?P<at>.+))?", _read_all(kind))
         for kind, words in KINDS.items()
     ),
     (
-        pattern(rf"{THE}{COUNT} {WAY_ORDER} (?P<label>.+?)(?: (?:to|from) (?P<at>.+))?"),
+        rf"{THE}{COUNT} {WAY_ORDER} (?P<label>.+?)(?: (?:to|from) (?P<at>.+))?",
         lambda m: Several(
             label=m["label"],
             order=read_order(m["order"]),
@@ -331,13 +332,19 @@ FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
         ),
     ),
     (
-        pattern(rf"{ALL} (?:(?:remembered|known) )?(?P<label>.+)"),
+        rf"{ALL} (?:(?:remembered|known) )?(?P<label>.+)",
         lambda m: Several(label=m["label"]),
     ),
     (
-        pattern(rf"(?:next to|beside|near(?: to)?|close to|by){OPEN}(?P<of>.+)"),
+        rf"(?:next to|beside|near(?: to)?|close to|by){OPEN}(?P<of>.+)",
         lambda m: NextTo(m["of"]),
     ),
-    (pattern(rf"(?:facing|looking at){OPEN}(?P<of>.+)"), lambda m: Facing(m["of"])),
+    (rf"(?:facing|looking at){OPEN}(?P<of>.+)", lambda m: Facing(m["of"])),
 )
 """Tried in this order; the first that fits is meant."""
+
+
+@cache
+def _forms() -> tuple[tuple[re.Pattern[str], Read], ...]:
+    """Return the forms as patterns: to make them all takes as long as to load a package."""
+    return tuple((pattern(form), read) for form, read in FORMS)
