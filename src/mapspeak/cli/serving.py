@@ -189,11 +189,11 @@ def serve(robots: tuple[str, ...], **given: Any) -> None:  # noqa: ANN401 - clic
 
 
 async def _serve(options: ServeOptions) -> None:
-    from mapspeak.server.transport import serve_http, serve_stdio  # noqa: PLC0415
-
     async with AsyncExitStack() as links:
         scratch = Path(links.enter_context(TemporaryDirectory(prefix="mapspeak-")))
         with _loading():
+            from mapspeak.server.transport import serve_http, serve_stdio  # noqa: PLC0415
+
             served = await _open_all(options, links, scratch)
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(_end_on_signal, served.sessions, scratch)
