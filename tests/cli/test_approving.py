@@ -21,10 +21,10 @@ QUEUED = Policy(
 )
 
 
-def wish(guard: Guard) -> str:
+def request(guard: Guard) -> str:
     with pytest.raises(ApprovalNeededError) as raised:
         guard.clear(LAMP, robot_s=0.0)
-    return raised.value.wish_id
+    return raised.value.request_id
 
 
 def approve(folder: Path, *arguments: str) -> str:
@@ -36,32 +36,32 @@ def approve(folder: Path, *arguments: str) -> str:
 def test_what_waits_is_listed_and_approved_by_its_id(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, QUEUED)
     assert "Nothing waits" in approve(tmp_path)
-    wish_id = wish(guard)
-    assert approve(tmp_path) == f"{wish_id}  publish std_msgs/msg/Bool on /lamp\n"
-    assert "Approved: publish" in approve(tmp_path, wish_id)
+    request_id = request(guard)
+    assert approve(tmp_path) == f"{request_id}  publish std_msgs/msg/Bool on /lamp\n"
+    assert "Approved: publish" in approve(tmp_path, request_id)
     assert "Nothing waits" in approve(tmp_path)
     guard.clear(LAMP, robot_s=0.0)
-    assert wish(guard) != wish_id
+    assert request(guard) != request_id
 
 
-def test_the_same_wish_waits_once(tmp_path: Path) -> None:
+def test_the_same_request_waits_once(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, QUEUED)
-    assert wish(guard) == wish(guard)
+    assert request(guard) == request(guard)
 
 
 def test_a_word_that_nobody_used_is_forgotten_in_the_end(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, QUEUED)
-    wish_id = wish(guard)
-    approve(tmp_path, wish_id)
+    request_id = request(guard)
+    approve(tmp_path, request_id)
     now_s = guard.approvals.now_s()
     guard.approvals.now_s = lambda: now_s + 601.0
-    assert wish(guard) != wish_id
+    assert request(guard) != request_id
 
 
 def test_an_id_that_nothing_waits_under_is_answered_with_what_does(tmp_path: Path) -> None:
-    wish_id = wish(make_guard(tmp_path, QUEUED))
-    assert wish_id in approve(tmp_path, "7-7")
-    assert wish_id in approve(tmp_path, "../../hold")
+    request_id = request(make_guard(tmp_path, QUEUED))
+    assert request_id in approve(tmp_path, "7-7")
+    assert request_id in approve(tmp_path, "../../hold")
 
 
 def test_what_waits_is_listed_on_one_printable_line_each(tmp_path: Path) -> None:

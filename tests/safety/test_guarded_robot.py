@@ -561,9 +561,9 @@ async def test_a_drive_that_waits_for_a_persons_word_gets_it_once(tmp_path: Path
     room = make_guard(tmp_path).approvals.room
     with calling(Caller(client="tester")):
         assert shell_command("approve") in await refusal_of(robot, NEAR)
-        (wish_id,) = room.list_waiting()
-        assert "tester" in room.list_waiting()[wish_id]
-        room.approve(wish_id)
+        (request_id,) = room.list_waiting()
+        assert "tester" in room.list_waiting()[request_id]
+        room.approve(request_id)
     with calling(Caller(client="another")), pytest.raises(ApprovalNeededError):
         await robot.send_goal(NEAR)
     with calling(Caller(client="tester")):
@@ -724,8 +724,8 @@ async def test_an_approval_is_for_the_pose_that_was_asked_for(tmp_path: Path) ->
     room = make_guard(tmp_path).approvals.room
     with calling(Caller(client="tester")):
         await refusal_of(robot, NEAR)
-        (wish_id,) = room.list_waiting()
-        room.approve(wish_id)
+        (request_id,) = room.list_waiting()
+        room.approve(request_id)
         for other in (Pose(NEAR.x + 0.2, NEAR.y), Pose(NEAR.x, NEAR.y, 0.5)):
             with pytest.raises(ApprovalNeededError):
                 await robot.send_goal(other)

@@ -5,8 +5,7 @@ import re
 from pathlib import Path
 
 from mapspeak.safety import Policy
-from mapspeak.safety.policyfile import load_policy
-from mapspeak.safety.policyfile import _PolicyFile
+from mapspeak.safety.policyfile import _PolicyFile, load_policy
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "limits.md"
 

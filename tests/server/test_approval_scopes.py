@@ -182,11 +182,11 @@ async def test_a_search_waits_for_an_operators_word_where_nobody_can_be_asked(
     async with connect(robot, tmp_path, guard=guard, tools=TOOLS) as client:
         await client.call_tool("search_for", arguments)
         refused = await client.call_tool("search_for", {**arguments, "seen": False})
-        ((wish_id, what),) = guard.approvals.room.list_waiting().items()
-        guard.approvals.room.approve(wish_id)
+        ((request_id, what),) = guard.approvals.room.list_waiting().items()
+        guard.approvals.room.approve(request_id)
         answer = await client.call_tool("search_for", {**arguments, "seen": False})
     assert shell_command("approve") in text_of(refused)
     assert what.startswith("search for 'ladder', up to 40 m, up to 5 drives within 600 s, asked by")
     assert report_of(answer)["state"] != "refused"
     assert robot.goals
-    assert all(said.startswith(f"by approval {wish_id}: search") for said in allowed(tmp_path))
+    assert all(said.startswith(f"by approval {request_id}: search") for said in allowed(tmp_path))

@@ -45,7 +45,7 @@ def asking_guard(folder: Path, otherwise: Otherwise = Otherwise.REFUSE) -> Guard
 
 
 def known_ids(guard: Guard) -> list[str]:
-    """Return the ids of the wishes so far, which a client may guess, and of the next."""
+    """Return the ids of the requests so far, which a client may guess, and of the next."""
     other = Publish(topic="/lamp", type="std_msgs/msg/Bool", message={"data": True})
     prefix, _, number = guard.approvals.ask(other, client="another").rpartition("-")
     return [f"{prefix}-{each}" for each in range(1, int(number) + 2)]
@@ -84,7 +84,7 @@ async def agree(
 
 @pytest.mark.parametrize("otherwise", Otherwise)
 @pytest.mark.parametrize("state", [None, "", "forged"])
-async def test_a_client_that_cannot_ask_does_not_approve_its_own_wish(
+async def test_a_client_that_cannot_ask_does_not_approve_its_own_request(
     tmp_path: Path, otherwise: Otherwise, state: str | None
 ) -> None:
     robot, guard = FakeRobot(HALL, pose=Pose(1.5, 1.0)), asking_guard(tmp_path, otherwise)
@@ -92,8 +92,8 @@ async def test_a_client_that_cannot_ask_does_not_approve_its_own_wish(
         assert client.protocol_version == CALLS_AGAIN
         refused = await client.call_tool("navigate_to", dict(HERE))
         assert refused.is_error
-        for wish_id in known_ids(guard):
-            await answer(client, HERE, f"approval-{wish_id}", YES, state)
+        for request_id in known_ids(guard):
+            await answer(client, HERE, f"approval-{request_id}", YES, state)
         again = await client.call_tool("navigate_to", dict(HERE))
     assert again.is_error
     assert text_of(again) == text_of(refused)

@@ -300,8 +300,8 @@ async def test_a_client_is_never_asked_for_what_waits_for_an_operator(
     async with connect(robot, tmp_path, guard=guard, mode=mode, on_question=agree) as client:
         result = await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
         assert "once a person has typed" in text_of(result)
-        (wish_id,) = guard.approvals.room.list_waiting()
-        guard.approvals.room.approve(wish_id)
+        (request_id,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(request_id)
         await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert len(robot.goals) == 1
 
@@ -309,16 +309,16 @@ async def test_a_client_is_never_asked_for_what_waits_for_an_operator(
 def test_a_word_is_taken_only_from_the_client_that_was_asked_for_it(tmp_path: Path) -> None:
     approvals = make_guard(tmp_path).approvals
     wanted = Publish(topic="/lamp", type="std_msgs/msg/Bool", message={"data": True})
-    wish_id = approvals.ask(wanted, client="a")
-    assert not approvals.grant(wish_id, client="a", secret="")
-    secret = approvals.ask_client(wish_id)
-    assert not approvals.grant(wish_id, client="b", secret=secret)
-    assert not approvals.grant(wish_id, client="a", secret="")
+    request_id = approvals.ask(wanted, client="a")
+    assert not approvals.grant(request_id, client="a", secret="")
+    secret = approvals.ask_client(request_id)
+    assert not approvals.grant(request_id, client="b", secret=secret)
+    assert not approvals.grant(request_id, client="a", secret="")
     assert not approvals.grant("other", client="a", secret=secret)
     assert approvals.take_word(wanted, client="a") is None
-    assert approvals.grant(wish_id, client="a", secret=secret)
-    assert not approvals.grant(wish_id, client="a", secret=secret)
-    assert approvals.take_word(wanted, client="a") == wish_id
+    assert approvals.grant(request_id, client="a", secret=secret)
+    assert not approvals.grant(request_id, client="a", secret=secret)
+    assert approvals.take_word(wanted, client="a") == request_id
 
 
 async def test_what_is_remembered_is_in_the_log(tmp_path: Path) -> None:

@@ -347,14 +347,14 @@ async def test_a_waiting_command_is_shown_and_approved_once(tmp_path: Path) -> N
     guard = make_guard(tmp_path, Policy(approval=approval))
     async with serve_live(tmp_path, guard=guard) as live:
         await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
-        ((wish, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
-        assert (await live.command("approve", id=wish)).status_code == 403
+        ((request, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
+        assert (await live.command("approve", id=request)).status_code == 403
         await live.unlock()
-        assert "Approved: drive to" in (await live.command("approve", id=wish)).text
-        assert (await live.command("approve", id=wish)).status_code == 409
+        assert "Approved: drive to" in (await live.command("approve", id=request)).text
+        assert (await live.command("approve", id=request)).status_code == 409
         (word,) = [line for line in audit_of(tmp_path) if line.event == "approval"]
         assert word.client == "a person at the live page"
-        assert word.said.startswith(f"approved {wish}: drive to")
+        assert word.said.startswith(f"approved {request}: drive to")
         driven = await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert not driven.is_error
     assert len(live.robot.goals) == 1
@@ -366,9 +366,9 @@ async def test_an_approval_that_has_run_out_is_neither_shown_nor_given(tmp_path:
     async with serve_live(tmp_path, guard=guard) as live:
         await live.unlock()
         await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
-        ((wish, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
+        ((request, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
         guard.approvals.now_s = lambda: VALID_S + 60.0
-        answer = await live.command("approve", id=wish)
+        answer = await live.command("approve", id=request)
         async with live.hear() as events:
             while (await next_of(events, "robot"))["waiting"]:
                 pass
@@ -380,9 +380,9 @@ async def test_a_refused_command_no_longer_waits(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, Policy(approval=approval))
     async with serve_live(tmp_path, guard=guard) as live:
         await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
-        ((wish, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
+        ((request, _),) = (await live.wait_for("robot", "waiting"))["waiting"].items()
         await live.unlock()
-        assert "Refused: drive to" in (await live.command("refuse", id=wish)).text
+        assert "Refused: drive to" in (await live.command("refuse", id=request)).text
         assert not guard.approvals.room.list_waiting()
         again = await live.client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert again.is_error

@@ -34,8 +34,8 @@ QUEUE = Approval(otherwise=Otherwise.QUEUE)
 
 def approve_all(guard: Guard) -> None:
     """Says yes to all that waits for a person's word."""
-    for wish_id in guard.approvals.room.list_waiting():
-        guard.approvals.room.approve(wish_id)
+    for request_id in guard.approvals.room.list_waiting():
+        guard.approvals.room.approve(request_id)
 
 
 async def test_a_skill_is_noted_before_it_runs_and_when_it_has_ended(tmp_path: Path) -> None:

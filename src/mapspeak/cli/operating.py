@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("wish_id", required=False)
+@click.argument("request_id", required=False)
 @CONTROL_OPTION
-def approve(wish_id: str | None, control: Path | None) -> None:
+def approve(request_id: str | None, control: Path | None) -> None:
     """Approve a command that waits, once; without an id it lists what waits."""
     from mapspeak.safety import WaitingRoom  # noqa: PLC0415 - heavy; help must be quick
 
     room = WaitingRoom(control_folder(control) / "approvals")
-    if wish_id is not None:
-        click.echo(f"Approved: {room.approve(wish_id)}.")
+    if request_id is not None:
+        click.echo(f"Approved: {room.approve(request_id)}.")
         return
     waiting = room.list_waiting()
     for waiting_id, what in waiting.items():

@@ -1,4 +1,4 @@
-"""Commands that wait for a person's word, one for all drives of a call, and those that got it."""
+"""Approval requests: commands, or all drives of a call, that a person has to agree to."""
 
 import json
 import secrets
@@ -15,7 +15,7 @@ from mapspeak.safety.commands import Command, is_same, say_command
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ApprovalScope:
-    """What a call of a tool wants to drive for, and no farther than what.
+    """What one tool call may drive and command once a person agrees, with its bounds.
 
     Attributes:
         what: In words, as in "may the robot explore".
@@ -80,7 +80,7 @@ def covered_by(word: str) -> Generator[None]:
 class _Approved:
     """A scope that a person has agreed to, as far as it is used up."""
 
-    wish_id: str
+    request_id: str
     begun_s: float
     n_left: int
     n_commands_left: int
@@ -92,10 +92,10 @@ class ApprovalScopes:
     def __init__(self) -> None:
         self._approved: dict[tuple[str, ApprovalScope], _Approved] = {}
 
-    def begin(self, scope: ApprovalScope, *, client: str, wish_id: str, robot_s: float) -> None:
+    def begin(self, scope: ApprovalScope, *, client: str, request_id: str, robot_s: float) -> None:
         """Note that a person has agreed; the first drive is yet to be taken."""
         self._approved[client, scope] = _Approved(
-            wish_id, robot_s, scope.n_drives, scope.n_commands
+            request_id, robot_s, scope.n_drives, scope.n_commands
         )
 
     def take_part(
@@ -112,7 +112,7 @@ class ApprovalScopes:
             return None
         approved.n_left -= is_drive
         approved.n_commands_left -= not is_drive
-        return approved.wish_id
+        return approved.request_id
 
     def end(self, scope: ApprovalScope, *, client: str) -> None:
         """Forget one: what is left of it covers nothing more."""
@@ -133,8 +133,8 @@ Wanted = Command | ApprovalScope
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Wish:
-    """What a client asked for.
+class _Request:
+    """An approval request of a client.
 
     Attributes:
         asked_s: When, by the same clock as all times here.
@@ -154,10 +154,10 @@ class WaitingRoom:
 
     folder: Path
 
-    def add(self, wish_id: str, said: str) -> None:
+    def add(self, request_id: str, said: str) -> None:
         """Write a command that waits."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._file(wish_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
+        self._file(request_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
 
     def list_waiting(self) -> dict[str, str]:
         """Return what waits, each on one line, by its id."""
@@ -170,50 +170,50 @@ class WaitingRoom:
                 continue
         return waiting
 
-    def approve(self, wish_id: str) -> str:
+    def approve(self, request_id: str) -> str:
         """Approve a waiting command and return it in words.
 
         Raises:
             ConfigError: Nothing waits under that id.
         """
-        said = self._require_waiting(wish_id)
-        self._file(wish_id, "waiting").rename(self._file(wish_id, "approved"))
+        said = self._require_waiting(request_id)
+        self._file(request_id, "waiting").rename(self._file(request_id, "approved"))
         return said
 
-    def refuse(self, wish_id: str) -> str:
+    def refuse(self, request_id: str) -> str:
         """Take a waiting command off the list and return it in words.
 
         Raises:
             ConfigError: Nothing waits under that id.
         """
-        said = self._require_waiting(wish_id)
-        self._file(wish_id, "waiting").unlink(missing_ok=True)
+        said = self._require_waiting(request_id)
+        self._file(request_id, "waiting").unlink(missing_ok=True)
         return said
 
-    def take_approved(self, wish_id: str) -> bool:
+    def take_approved(self, request_id: str) -> bool:
         """Return whether a command was approved; once."""
         try:
-            self._file(wish_id, "approved").unlink()
+            self._file(request_id, "approved").unlink()
         except OSError:
             return False
         return True
 
-    def _require_waiting(self, wish_id: str) -> str:
+    def _require_waiting(self, request_id: str) -> str:
         waiting = self.list_waiting()
-        if wish_id not in waiting:
+        if request_id not in waiting:
             raise ConfigError(
-                f"Nothing waits for approval under {wish_id!r}.",
+                f"Nothing waits for approval under {request_id!r}.",
                 hint=f"There waits: {', '.join(waiting) or 'nothing'}.",
             )
-        return waiting[wish_id]
+        return waiting[request_id]
 
-    def remove(self, wish_id: str) -> None:
+    def remove(self, request_id: str) -> None:
         """Forget a command."""
         for state in ("waiting", "approved"):
-            self._file(wish_id, state).unlink(missing_ok=True)
+            self._file(request_id, state).unlink(missing_ok=True)
 
-    def _file(self, wish_id: str, state: str) -> Path:
-        return self.folder / f"{wish_id}.{state}"
+    def _file(self, request_id: str, state: str) -> Path:
+        return self.folder / f"{request_id}.{state}"
 
 
 @dataclass(slots=True)
@@ -226,86 +226,86 @@ class Approvals:
 
     room: WaitingRoom
     now_s: Callable[[], float]
-    _wishes: dict[str, _Wish] = field(default_factory=dict)
+    _requests: dict[str, _Request] = field(default_factory=dict)
     _asked: set[str] = field(default_factory=set)
     _granted: set[str] = field(default_factory=set)
-    _n_wishes: int = 0
+    _n_requests: int = 0
     _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
 
     def ask(self, wanted: Wanted, *, client: str) -> str:
-        """Note a wish and return its id; the same one for the same wish."""
+        """Note a request and return its id; the same one for the same request."""
         self._forget_old()
-        for known in self._wishes.values():
+        for known in self._requests.values():
             if _is_of(known, wanted, client):
                 return known.id
-        self._n_wishes += 1
-        wish_id = f"{self._prefix}-{self._n_wishes}"
-        self._wishes[wish_id] = _Wish(
-            id=wish_id, wanted=wanted, client=client, asked_s=self.now_s()
+        self._n_requests += 1
+        request_id = f"{self._prefix}-{self._n_requests}"
+        self._requests[request_id] = _Request(
+            id=request_id, wanted=wanted, client=client, asked_s=self.now_s()
         )
-        return wish_id
+        return request_id
 
     def fresh_room(self) -> WaitingRoom:
         """Return the waiting room, without those of this server's commands that have run out."""
         self._forget_old()
         return self.room
 
-    def queue(self, wish_id: str) -> None:
-        """Let a wish wait for `mapspeak approve`."""
-        wish = self._wishes[wish_id]
-        who = f", asked by {wish.client}" if wish.client else ""
-        self.room.add(wish_id, f"{_say(wish.wanted)}{who}")
+    def queue(self, request_id: str) -> None:
+        """Let a request wait for `mapspeak approve`."""
+        request = self._requests[request_id]
+        who = f", asked by {request.client}" if request.client else ""
+        self.room.add(request_id, f"{_say(request.wanted)}{who}")
 
-    def ask_client(self, wish_id: str) -> str:
+    def ask_client(self, request_id: str) -> str:
         """Note that the client is asked now, and return the secret that its answer must know."""
-        self._asked.add(wish_id)
-        return self._wishes[wish_id].secret
+        self._asked.add(request_id)
+        return self._requests[request_id].secret
 
-    def grant(self, wish_id: str, *, client: str, secret: str) -> bool:
-        """Note a person's word for a wish, once; return False when that client was not asked."""
-        wish = self._wishes.get(wish_id)
-        if wish is None or wish_id not in self._asked or wish.client != client:
+    def grant(self, request_id: str, *, client: str, secret: str) -> bool:
+        """Note a person's word for a request, once; return False when that client was not asked."""
+        request = self._requests.get(request_id)
+        if request is None or request_id not in self._asked or request.client != client:
             return False
-        if not secrets.compare_digest(wish.secret.encode(), secret.encode()):
+        if not secrets.compare_digest(request.secret.encode(), secret.encode()):
             return False
-        self._asked.discard(wish_id)
-        self._granted.add(wish_id)
+        self._asked.discard(request_id)
+        self._granted.add(request_id)
         return True
 
     def take_word(self, wanted: Wanted, *, client: str) -> str | None:
-        """Return the id of the word that a person gave for this wish of this client, once."""
+        """Return the id of the word that a person gave for this request of this client, once."""
         self._forget_old()
-        for wish in list(self._wishes.values()):
-            if not _is_of(wish, wanted, client):
+        for request in list(self._requests.values()):
+            if not _is_of(request, wanted, client):
                 continue
-            if wish.id in self._granted or self.room.take_approved(wish.id):
-                self._forget(wish.id)
-                return wish.id
+            if request.id in self._granted or self.room.take_approved(request.id):
+                self._forget(request.id)
+                return request.id
         return None
 
     def close(self) -> None:
         """Forget everything: what waits here can no longer be done."""
-        for wish_id in list(self._wishes):
-            self._forget(wish_id)
+        for request_id in list(self._requests):
+            self._forget(request_id)
 
     def _forget_old(self) -> None:
         oldest_s = self.now_s() - VALID_S
-        old = [each.id for each in self._wishes.values() if each.asked_s < oldest_s]
-        surplus = list(self._wishes)[: max(len(self._wishes) - MOST_WAITING, 0)]
-        for wish_id in {*old, *surplus}:
-            self._forget(wish_id)
+        old = [each.id for each in self._requests.values() if each.asked_s < oldest_s]
+        surplus = list(self._requests)[: max(len(self._requests) - MOST_WAITING, 0)]
+        for request_id in {*old, *surplus}:
+            self._forget(request_id)
 
-    def _forget(self, wish_id: str) -> None:
-        del self._wishes[wish_id]
-        self._asked.discard(wish_id)
-        self._granted.discard(wish_id)
-        self.room.remove(wish_id)
+    def _forget(self, request_id: str) -> None:
+        del self._requests[request_id]
+        self._asked.discard(request_id)
+        self._granted.discard(request_id)
+        self.room.remove(request_id)
 
 
-def _is_of(wish: _Wish, wanted: Wanted, client: str) -> bool:
-    if isinstance(wish.wanted, ApprovalScope) or isinstance(wanted, ApprovalScope):
-        return wish.client == client and wish.wanted == wanted
-    return wish.client == client and is_same(wish.wanted, wanted)
+def _is_of(request: _Request, wanted: Wanted, client: str) -> bool:
+    if isinstance(request.wanted, ApprovalScope) or isinstance(wanted, ApprovalScope):
+        return request.client == client and request.wanted == wanted
+    return request.client == client and is_same(request.wanted, wanted)
 
 
 def _say(wanted: Wanted) -> str:

@@ -186,13 +186,13 @@ class ApprovalNeededError(PolicyError):
     """A person has to agree first.
 
     Attributes:
-        wish_id: What to grant when the person agrees.
+        request_id: What to grant when the person agrees.
     """
 
-    def __init__(self, question: str, *, wish_id: str, hint: str) -> None:
+    def __init__(self, question: str, *, request_id: str, hint: str) -> None:
         super().__init__(f"A person must agree first. {question}", hint=hint)
         self.question = question
-        self.wish_id = wish_id
+        self.request_id = request_id
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -308,15 +308,15 @@ class Guard:
             return Allowed(by=word) if word and isinstance(decision, Allowed) else decision
         scope = _scope_of(command)
         if scope is None:
-            wish_id = self.approvals.take_word(command, client=caller.client)
+            request_id = self.approvals.take_word(command, client=caller.client)
         else:
             is_drive = isinstance(command, DriveCommand)
-            wish_id = self._take_part(scope, caller.client, robot_s, is_drive=is_drive)
+            request_id = self._take_part(scope, caller.client, robot_s, is_drive=is_drive)
             question = f"May the robot {scope.said}? The limits of its policy stay."
             decision = NeedsApproval(question=question)
-        if wish_id is None:
+        if request_id is None:
             return decision
-        return Allowed(by=wish_id if scope is None else f"{wish_id}: {scope.said}")
+        return Allowed(by=request_id if scope is None else f"{request_id}: {scope.said}")
 
     def _take_part(
         self, scope: ApprovalScope, client: str, robot_s: float, *, is_drive: bool
@@ -325,13 +325,13 @@ class Guard:
         take = partial(
             self._scopes.take_part, scope, client=client, robot_s=robot_s, is_drive=is_drive
         )
-        wish_id = take()
-        if wish_id is not None:
-            return wish_id
-        wish_id = self.approvals.take_word(scope, client=client)
-        if wish_id is None:
+        request_id = take()
+        if request_id is not None:
+            return request_id
+        request_id = self.approvals.take_word(scope, client=client)
+        if request_id is None:
             return None
-        self._scopes.begin(scope, client=client, wish_id=wish_id, robot_s=robot_s)
+        self._scopes.begin(scope, client=client, request_id=request_id, robot_s=robot_s)
         return take()
 
     def end_scopes(self) -> None:
@@ -347,12 +347,12 @@ class Guard:
         return Situation(held_by=self.hold.read(), n_in_last_minute=n_lately)
 
     def _ask(self, command: Command, question: str, caller: Caller) -> ApprovalNeededError:
-        wish_id = self.approvals.ask(_scope_of(command) or command, client=caller.client)
+        request_id = self.approvals.ask(_scope_of(command) or command, client=caller.client)
         hint = "The client cannot ask anybody: tell the person that the policy wants their word."
         if self.policy.approval.otherwise is Otherwise.QUEUE:
-            self.approvals.queue(wish_id)
-            hint = f"Call again once a person has typed `{shell_command(f'approve {wish_id}')}`."
-        return ApprovalNeededError(question, wish_id=wish_id, hint=hint)
+            self.approvals.queue(request_id)
+            hint = f"Call again once a person has typed `{shell_command(f'approve {request_id}')}`."
+        return ApprovalNeededError(question, request_id=request_id, hint=hint)
 
     def _note(
         self, event: str, permit: Permit, *, robot_s: float, verdict: str = "", said: str

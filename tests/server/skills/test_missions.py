@@ -279,8 +279,8 @@ async def test_one_approval_covers_a_mission_and_not_the_next_one(tmp_path: Path
     async with missions(tmp_path, dock, guard=guard) as caller:
         asked = await caller.refuse("run_mission", tree=tree)
         assert dock.given == []
-        (wish,) = guard.approvals.room.list_waiting()
-        guard.approvals.room.approve(wish)
+        (request,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(request)
         told = await caller.ask("run_mission", tree=tree)
         assert "succeeded" in told
         assert len(caller.robot.goals) == 2
@@ -290,15 +290,15 @@ async def test_one_approval_covers_a_mission_and_not_the_next_one(tmp_path: Path
     assert "A person must agree" in again
     allowed = [line.said for line in audit_of(tmp_path) if line.verdict == "allowed"]
     assert len(allowed) == 4
-    assert all(wish in said for said in allowed)
+    assert all(request in said for said in allowed)
 
 
 async def test_a_word_for_one_tree_is_none_for_another_of_the_same_size(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, Policy(approval=QUEUE))
     async with missions(tmp_path, guard=guard) as caller:
         await caller.refuse("run_mission", tree="- drive: R2\n")
-        (wish,) = guard.approvals.room.list_waiting()
-        guard.approvals.room.approve(wish)
+        (request,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(request)
         other = await caller.refuse("run_mission", tree="- drive: R1\n")
         assert caller.robot.goals == {}
         await caller.ask("run_mission", tree="- drive: R2\n")

@@ -101,8 +101,8 @@ async def test_a_persons_word_lets_a_skill_publish_what_is_usually_denied(tmp_pa
     async with exposed(system, tmp_path, expose=(), skills=load(tmp_path), guard=guard) as caller:
         asked = await caller.refuse("place_robot", x=2.5)
         assert poses == []
-        (wish,) = guard.approvals.room.list_waiting()
-        guard.approvals.room.approve(wish)
+        (request,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(request)
         await caller.ask("place_robot", x=2.5)
         again = await caller.refuse("place_robot", x=3.5)
     assert "run the skill place_robot (x=2.5)" in asked

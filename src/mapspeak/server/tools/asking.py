@@ -96,8 +96,8 @@ class Asking:
             if not self.can_ask:
                 return False
             state = self._context.request_state if self._context is not None else None
-            wish_id = key.removeprefix(KEY)
-            if not approvals.grant(wish_id, client=self._client, secret=state or ""):
+            request_id = key.removeprefix(KEY)
+            if not approvals.grant(request_id, client=self._client, secret=state or ""):
                 return False
         return True
 
@@ -119,10 +119,10 @@ class Asking:
         form = ElicitRequestFormParams(
             message=needed.question, requested_schema=render_elicitation_schema(Agreement)
         )
-        key = f"{KEY}{needed.wish_id}"
+        key = f"{KEY}{needed.request_id}"
         return InputRequiredResult(
             input_requests={key: ElicitRequest(params=form)},
-            request_state=approvals.ask_client(needed.wish_id),
+            request_state=approvals.ask_client(needed.request_id),
         )
 
     async def ask_at_once(self, needed: ApprovalNeededError, approvals: Approvals) -> bool:
@@ -136,8 +136,8 @@ class Asking:
             return False
         if not isinstance(answer, AcceptedElicitation) or answer.data.agree is not True:
             return False
-        secret = approvals.ask_client(needed.wish_id)
-        return approvals.grant(needed.wish_id, client=self._client, secret=secret)
+        secret = approvals.ask_client(needed.request_id)
+        return approvals.grant(needed.request_id, client=self._client, secret=secret)
 
 
 def _is_yes(answer: ElicitResult) -> bool:

@@ -208,6 +208,8 @@ def paint_zones(
         ground: Palette numbers of the map area; changed in place, but for walls.
         zones: The later ones lie above; what they cover wholly has no place for a label.
     """
+    if not zones:
+        return {}
     numbers = np.zeros(ground.shape, dtype=np.uint16)
     shown = {}
     row = np.arange(ground.shape[0])[:, np.newaxis]
