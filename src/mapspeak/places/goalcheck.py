@@ -18,7 +18,7 @@ Opened = Callable[[Point], DistanceField]
 
 
 class GoalVerdict(StrEnum):
-    """What is to be said of a goal before driving to it."""
+    """Verdict on a goal before driving to it."""
 
     OK = "ok"
     NOT_FINITE = "not_finite"
@@ -39,7 +39,7 @@ class GoalCheck:
         clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and in the
             unknown.
         nearest: The nearest pose that would work, by ways from the goal that pass through no wall;
-            None for a good goal, and where there is none.
+            None for a good goal, and without such a pose.
         bounds: The corners of the map with the least and the greatest x and y; None if the goal
             is not a valid position.
         areas: The closed areas in the way: the one that the goal is in or too near to, the one
@@ -64,11 +64,11 @@ class GoalCheck:
 
 
 FARTHEST_M = 1e6
-"""No map reaches so far; farther numbers are typing errors, and overflow cell indices."""
+"""No map is that large; larger numbers are typing errors, and overflow cell indices."""
 SEARCH_M = 8.0
 """How far around a goal another one is looked for first."""
 NEAR_M = 1.0
-"""Whatever is nearer than that is the nearest within a square of twice as many metres."""
+"""An obstacle nearer than this is the nearest of all in a square twice as wide."""
 WALL_SIDES_M = 0.15
 """A goal in a wall belongs to the nearer side; to both where they differ by no more than this."""
 

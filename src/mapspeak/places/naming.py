@@ -244,7 +244,7 @@ def _say_phrases(world: WorldModel, wanted: str) -> str:
 
 
 def _say_guesses(answer: Answer) -> str:
-    """Name what may be meant, for the reader to confirm: a likeness alone is no goal."""
+    """Name what may be meant, for the reader to confirm: likeness alone does not make a goal."""
     first = answer.candidates[0]
     by = "meaning" if first.basis is Basis.MEANING else "words"
     told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in answer.candidates)

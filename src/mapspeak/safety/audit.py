@@ -1,4 +1,4 @@
-"""The audit log: append-only JSON lines, one for each decision and result, and who asked."""
+"""The audit log: append-only JSON lines for each decision and result, with the caller."""
 
 import fcntl
 import itertools

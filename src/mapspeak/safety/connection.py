@@ -202,7 +202,7 @@ class GuardedConnection:
         )
 
     def _objection_unseen(self, command: Publish) -> Refused | None:
-        """Return what is against a velocity when there is no time to look for the robot."""
+        """Return the objection to a velocity when there is no time to fetch the pose."""
         is_free = self._by_hand is None or not self._by_hand.knows_areas
         if is_free or not any(find_speeds(command.message)):
             return None

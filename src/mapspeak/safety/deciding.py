@@ -24,7 +24,7 @@ from mapspeak.safety.commands import (
 from mapspeak.safety.policy import RATE_KEYS, Policy
 
 MOST_NESTED = 8
-"""No message of speeds is nested deeper; what is, is refused unread."""
+"""Messages of speeds are not nested deeper; deeper ones are refused unread."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

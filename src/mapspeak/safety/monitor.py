@@ -1,4 +1,4 @@
-"""What is watched while a robot moves, and while it is held and should stand."""
+"""Monitors: closed areas ahead of a moving robot, its goal, and whether a held robot stands."""
 
 import math
 from collections.abc import Awaitable, Callable, Sequence
@@ -24,9 +24,9 @@ WAVER_M = 0.01
 """The pose of a standing robot differs by at most this between two looks."""
 LEAST_STEP_S = 0.05
 LOST_TRACK_S = 2.0
-"""What lies longer ago says nothing about how fast the robot drives now."""
+"""An older pose says nothing about how fast the robot drives now."""
 FASTEST_MPS = 5.0
-"""What seems to go faster was not driven: localisation has corrected itself."""
+"""A faster movement was not driven: localisation has corrected itself."""
 N_STEPS = 8
 """The number of points on the braking path at which the distance to areas is checked."""
 
@@ -90,7 +90,7 @@ class KeepOutMonitor:
     ) -> Cause | None:
         """Return which closed area the robot is about to enter; None when it enters none.
 
-        One that stands too near may drive along the area and away, and no nearer.
+        A robot already too close may move along or away from the area, never closer.
         """
         way = (here.point, *self._find_way_to_stand(here, now_s))
         for area in revision.areas:

@@ -1,4 +1,4 @@
-"""Whether and how a robot gets to a goal: by the map, and in legs round areas that are closed."""
+"""Goal checks by the map, and the legs that lead the robot round closed areas to a goal."""
 
 import itertools
 import math
@@ -23,13 +23,13 @@ from mapspeak.worldmodel.revision import MapRevision
 
 STEP_M = 0.1
 STRAY_M = 0.03
-"""So far the legs may lead off the way that was found: a part of the margin around areas."""
+"""Largest distance of the legs from the path that was found: part of the margin around areas."""
 SHORTEST_M = 0.5
 BOW_M = 1.0
-"""From areas farther off than this a leg needs no second look: no robot leaves a line so far."""
+"""A leg farther than this from all areas needs no second check: no robot strays that far."""
 AROUND_M = 2.0
 LEAVING_M = 0.01
-"""A robot that stands too near may come no nearer than by the noise of its pose."""
+"""A robot already too near may come nearer by this much: the noise of its pose."""
 
 
 def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...]:
@@ -143,7 +143,7 @@ def _between(start: Point, end: Point, share: float) -> Point:
 
 @dataclass(slots=True, kw_only=True)
 class GuardedDrive:
-    """A drive under way, as far as anyone has asked.
+    """A drive under way, as it was last seen.
 
     Attributes:
         goal_id: The id it is known by: that of its first leg.

@@ -1,4 +1,4 @@
-"""Velocities that are published: where they would take the robot, and if it may go there."""
+"""Published velocities: where they would take the robot, and whether it may go there."""
 
 import math
 from collections.abc import Callable, Generator, Mapping
@@ -18,7 +18,7 @@ from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered, foll
 from mapspeak.safety.planning import Planner
 
 LEAST_S = 0.5
-"""How long a single message moves the robot: about how long drivers wait for the next one."""
+"""How long one message moves the robot: about as long as base drivers wait for the next."""
 STEP_M = 0.05
 MOST_STEPS = 400
 

@@ -17,7 +17,7 @@ from mapspeak.spatial.rooms import Door, Region, RoomMap
 CLOSED = 100
 """A closed cell is as little floor to drive on as one with a wall."""
 MARGIN_M = 0.15
-"""What ways and goals leave between the robot's edge and a closed area.
+"""Distance that paths and goals keep between the robot's edge and a closed area.
 
 A pose is off by some centimetres, and no navigation follows a way exactly.
 """
@@ -180,9 +180,9 @@ _FAR_CELLS = 30_000
 
 
 SILL_M = 0.3
-"""How much of the floor along the way through counts to a door."""
+"""Depth of the floor, along the way through, that belongs to a door."""
 POST_M = 0.15
-"""A door's outline goes so far into the walls beside it."""
+"""Length by which a door's outline reaches into the walls beside it."""
 N_CORNERS = 8
 
 

@@ -1,4 +1,4 @@
-"""The map under ids: rooms, doors, frontiers and remembered places, as everybody names them."""
+"""The world model: rooms, doors, frontiers and remembered places of the map, under ids."""
 
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
@@ -39,7 +39,7 @@ from mapspeak.worldmodel.recollection import (
 from mapspeak.worldmodel.revision import MapRevision
 
 AROUND_M = 0.5
-"""So far beyond the posts and the robot's own radius both sides of a door are looked at."""
+"""Distance beyond posts and robot radius within which both sides of a door are examined."""
 
 
 def find_crossing(rooms: RoomMap, distances: DistanceField, door: Door) -> Point | None:

@@ -27,9 +27,9 @@ from mapspeak.spatial.rooms.identity import match_best_first
 logger = logging.getLogger(__name__)
 
 SAME_THING_M = 1.0
-"""A thing of the same name so near to where one was before is that one, seen better."""
+"""A thing of the same name within this distance of an earlier one is that one, seen better."""
 MOST_CALLED = 1000
-"""So many things of one name are told apart; beyond, nobody reads them."""
+"""Largest number of things of one name that are told apart."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +97,7 @@ class Recollection:
         return (*self.places, *self.things)
 
     def prepare(self) -> None:
-        """Build the index that questions are answered from; who asks meanwhile waits for it."""
+        """Build the index that answers questions; a question asked meanwhile waits for it."""
         with self._lock:
             if self._index is None:
                 self._index = EntryIndex(self._entries, vectors=self._find_vectors())
@@ -132,7 +132,7 @@ class Recollection:
 
     @cached_property
     def _names(self) -> EntryIndex:
-        """Names alone: what nobody has to compare meanings for."""
+        """The index of names alone, for which no meanings are compared."""
         bare = (
             Entry(
                 id=each.id,
@@ -198,7 +198,7 @@ class Recollector:
         self._find_model = find_model
         self._kept = kept
         self._lock = threading.Lock()
-        # Held while the model is loaded: by whoever needs it first, or ahead of the first question.
+        # Held while the model is loaded, by the first question or ahead of it.
         self._loading = threading.RLock()
         self._latest: Recollection | None = None
 
@@ -314,7 +314,7 @@ def number_things(
 
 
 def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:
-    """Rank how surely one thing is another that was known before; None where it is none."""
+    """Rank how surely one thing is another that was known before; None for another thing."""
     if not name_the_same(thing.label, before.label):
         return None
     n_shared = len(_views_of(thing) & _views_of(before))

@@ -27,7 +27,7 @@ from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.standing import point_ahead
 
 BESIDE_M = 1.5
-"""So near it goes to a thing that it has found by itself."""
+"""Distance at which it stops before a thing that it has found by itself."""
 NUMBER = r"-?\d+(?:\.\d+)?"
 SIDES_DEG = {"to the left of": 90.0, "to the right of": -90.0, "in front of": 0.0, "behind": 180.0}
 COMPASS_DEG = {"east": 0.0, "north": 90.0, "west": 180.0, "south": -90.0}

@@ -123,7 +123,7 @@ class Recall:
 
 
 MOST_TIED = 30
-"""So many equally likely ones are sorted by their way; of more, the first by their ids."""
+"""Up to this number, equally likely candidates are sorted by path; beyond, by id."""
 
 
 def recall(world: WorldModel, query: RecallQuery) -> Recall:
@@ -190,7 +190,7 @@ def _find_rooms(world: WorldModel, remembered: Remembered) -> tuple[str, ...]:
 
 
 def last_seen(world: WorldModel, remembered: Remembered) -> datetime | None:
-    """Return when it was seen last, by the calendar; None where nobody noted it."""
+    """Return when it was last seen, by the calendar; None if not noted."""
     if isinstance(remembered, RememberedPlace):
         return remembered.waypoint.recorded_at
     times = (view.recorded_at for _, view in _list_views(world, remembered))
@@ -253,9 +253,9 @@ SURE_RATIO = 0.98
 """A thing that two good views agree on is surer than that, and one view alone is not."""
 DOUBTFUL_RATIO = 0.5
 LARGEST_OFF_M = 1.2
-"""A thing whose place is known no better is not sure to be ahead of who goes there."""
+"""A thing located less precisely may not be in view from in front of it."""
 LEAST_FACED_RATIO = 0.3
-"""Of where a thing may be, less than that ahead is too little to promise that it will be faced."""
+"""Least share of where a thing may be that must lie ahead to promise that the robot faces it."""
 
 
 def find_doubt(first: RecallCandidate, *, room_id: str | None) -> RecallDoubt | None:
@@ -281,7 +281,7 @@ def find_doubt(first: RecallCandidate, *, room_id: str | None) -> RecallDoubt | 
 
 
 LEAST_VIEWS = 3
-"""Two views of wrong things meet somewhere now and then; three hardly ever do."""
+"""Two wrong bearings sometimes intersect by chance; three rarely do."""
 APART_M = 2.0
 """Of things of one name that stand nearer to each other, views may have been mixed up."""
 
@@ -292,7 +292,7 @@ def _find_best_known(
     """Find the one thing that views from three places agree on, with no other of its name near.
 
     Returns:
-        Its id; None where there is none, or several, or where anything else speaks against it.
+        Its id; None without one, with several, or where anything else speaks against it.
     """
     meant = answer.candidates[: answer.n_meant]
     named = [passing[each.entry.id] for each in meant if each.basis is Basis.NAME]

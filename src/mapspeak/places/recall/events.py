@@ -1,4 +1,4 @@
-"""Events of the semantic map where ways are planned: what they close, and what they make slow."""
+"""Events of the semantic map in path planning: the floor they close, and the floor they slow."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -33,10 +33,10 @@ from mapspeak.worldmodel.revision import Hindrance, MapRevision
 SPOT_RADIUS_M = 0.5
 """An event at a point takes this much floor around it."""
 REST_RATIO = 0.1
-"""A room is cut off when no more of what was reached of it is left: a few cells at its door."""
+"""A room is cut off when at most this share of its reachable floor is left, at its door."""
 AVOID_FACTOR, AVOID_EXTRA_M = 10.0, 20.0
 SLOW_FACTOR, SLOW_EXTRA_M = 2.0, 5.0
-"""What a way counts that leads through: so many times its length there, at least so much more."""
+"""Cost of a path through: its length times the factor, and at least the extra metres more."""
 
 
 def note_event(
@@ -227,7 +227,7 @@ def _find_outlines(event: Event, revision: MapRevision) -> tuple[Outline, ...]:
         return event.outlines
     found: list[Outline] = []
     for place_id in find_place_ids(event.place):
-        # Rooms are found only where somebody has written an event without an outline.
+        # Rooms are found only for an event that was written without an outline.
         rooms = revision.rooms
         door = next((each for each in rooms.doors if each.id == place_id), None)
         found += _outlines_of(rooms, rooms.find_region(place_id) or door)

@@ -1,4 +1,4 @@
-"""Which records a person means who says that something is to be forgotten, or is gone."""
+"""The records that a person means by what is to be forgotten, or is gone."""
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
@@ -10,7 +10,7 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 AROUND_M = 5.0
-"""What somebody says is gone was no farther from where the robot looks."""
+"""Largest distance from the robot to a thing that a person says is gone."""
 
 
 def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:
@@ -43,7 +43,7 @@ def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:
 
 
 def find_gone(world: WorldModel, words: str, here: Point) -> list[RememberedThing]:
-    """Return the things that somebody means who says, looking from a point, that it is gone."""
+    """Return the things that a person may mean who looks from a point and says: it is gone."""
     called = find_things(world, words)
     if THING_ID.fullmatch(words.strip()):
         return called

@@ -25,17 +25,17 @@ from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 
 SECTOR_RAD = math.radians(40)
-"""A place still lies in a direction so far off it."""
+"""Largest angle off a direction at which a place still lies in it."""
 AWAY_M = 1.0
 FARTHEST_M = 2.5
 """A place on a side of a thing is at most this far from it."""
 BESIDE_DOOR_M = 0.6
 BEYOND_RAD = math.radians(60)
-"""So far off the way through a door is still through it, and not along its wall."""
+"""Largest angle off the direction through a door that still leads through it."""
 HERE_M = 0.3
 """From nearer than this, a thing has no sides."""
 TURNS = {Side.FRONT: 0.0, Side.LEFT: math.pi / 2, Side.BEHIND: math.pi, Side.RIGHT: -math.pi / 2}
-"""From a thing's own front to its sides; who looks at it has left and right the other way."""
+"""Turns from a thing's own front to its sides; for a viewer left and right are swapped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Aim:
         heading_rad: The direction from the thing.
         away_m: How far from its edge it should be.
         home: The region it has to lie in; None for any.
-        sees: What nothing may stand before; None where that does not matter.
+        sees: The point that must be in sight; None for none.
         how: What to say of the point of view.
     """
 

@@ -24,10 +24,10 @@ LEAST_WALL_M = 0.6
 """Shorter ones are the sides of pillars, niches and door frames."""
 CORNER_RAD = (math.radians(50), math.radians(130))
 BEHIND_M = 0.35
-"""A wall stands at most so far behind the last floor."""
+"""Largest distance from the last floor to the wall behind it."""
 RECTANGLE_RATIO = 0.75
 LEAST_WALL_RATIO = 0.5
-"""So much of a side must be wall; the rest may be doors and openings."""
+"""Least share of a side that must be wall; the rest may be doors and openings."""
 AT_CORNER_M = 1.5
 AT_WALL_M = 0.8
 """The most room between a wall and the circle of a robot that stands at it."""

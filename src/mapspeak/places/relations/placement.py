@@ -16,7 +16,7 @@ from mapspeak.worldmodel.model import WorldModel
 
 IN_DOOR_M = 0.5
 AT_ONCE = 512
-"""So many lines of sight are looked along together."""
+"""Number of lines of sight that are computed together."""
 MOST_EXTENT = 256
 
 

@@ -146,7 +146,7 @@ SHARE = (0.3, 0.7)
 """What is between two things is in this part of the way from one to the other."""
 ASIDE_RATIO = 0.25
 STEP_OFF_M = 1.0
-"""So far off a thing itself, or off the middle of a way, the robot may have to stand."""
+"""Largest distance from a thing, or from the middle of a path, at which the robot may stand."""
 
 
 def stand_between(world: WorldModel, one: Referent, other: Referent) -> Place:

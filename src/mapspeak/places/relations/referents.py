@@ -32,10 +32,10 @@ from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 ROBOT = "the robot"
 AROUND_DOOR_M = 0.6
-"""So much floor on both sides of a door says which way it leads."""
+"""Floor within this distance on both sides of a door tells which way it leads."""
 AROUND_THING_M = 1.5
 BOTH_SIDES_M = 0.2
-"""What is nearly as far from the floor of two regions belongs to neither."""
+"""A thing whose distances to two regions differ by less belongs to neither."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

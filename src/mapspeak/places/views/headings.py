@@ -1,4 +1,4 @@
-"""Which way the robot looks where it stops: where a picture shows what none has shown."""
+"""The heading in which the robot stops: where a picture shows what no other has shown."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from mapspeak.worldmodel.model import WorldModel
 BEYOND_M = 1.0
 """A ray that ends in the unknown meets a wall so much farther on."""
 GOOD_RATIO = 0.9
-"""A heading that shows so much of what the best one does is as good: the least turn decides."""
+"""A heading that shows this share of the best one's wall is as good: the least turn decides."""
 
 MOVED_M = 1.0
 """A place farther from a goal is another one."""
@@ -38,7 +38,7 @@ def aim_for_picture(
 ) -> CheckedGoal:
     """Turn the pose of a goal to where most wall is expected that no picture shows.
 
-    A frontier stays in view: who maps ahead would else see nothing of what it is for.
+    A frontier stays in view: else the picture would not show what the drive is for.
 
     Args:
         views: The pictures so far, the latest last.

@@ -1,4 +1,4 @@
-"""From where a place is looked at, how much of it is in view there, and what else should be."""
+"""Viewpoints: where to look at a place from, how much of it is in view, what else should be."""
 
 import math
 from collections.abc import Iterator
@@ -23,12 +23,12 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
 
 AWAY_M = 2.0
-"""A door or a point is looked at from about so far."""
+"""Preferred distance from which to look at a door or a point."""
 FARTHEST_M = 4.0
 GOOD_RATIO = 0.9
-"""A place that shows so much of what the best one does is as good: the nearest is taken."""
+"""A place that shows this share of what the best one does is as good: the nearest is taken."""
 PATH_WEIGHT = 0.1
-"""So much of a metre off the best distance is worth a metre of way."""
+"""A metre of path costs as much as this many metres off the best distance."""
 OWN_DOOR_M = 0.3
 OWN_THING_M = 0.6
 THERE_M = 0.25
