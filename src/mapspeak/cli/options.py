@@ -174,16 +174,12 @@ def build_guard(choice: GuardChoice, *, robot: str, address: str = "") -> "Guard
         Hold,
         Policy,
         WaitingRoom,
+        load_policy,
     )
 
-    policy = Policy()
-    if choice.policy is not None:
-        from mapspeak.safety.policyfile import load_policy  # noqa: PLC0415 - only with a policy
-
-        policy = load_policy(choice.policy)
     control = control_folder(choice.control)
     return Guard(
-        policy=policy,
+        policy=Policy() if choice.policy is None else load_policy(choice.policy),
         audit=AuditLog(
             choice.audit or data_folder() / "audit.jsonl", wall_clock=wall_clock, robot=robot
         ),

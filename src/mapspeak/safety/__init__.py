@@ -48,6 +48,7 @@ from mapspeak.safety.policy import (
     Speeds,
     WhenBusy,
 )
+from mapspeak.safety.policyfile import load_policy
 from mapspeak.safety.robot import GuardedRobot
 from mapspeak.safety.velocities import HandDriving, publishing_for, zero_velocity_of
 
@@ -93,6 +94,7 @@ __all__ = [
     "current_caller",
     "decide",
     "guard_connection",
+    "load_policy",
     "publishing_for",
     "read_audit",
     "say_command",
