@@ -9,6 +9,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ from mapspeak.memory.episodes.observation import (
 )
 from mapspeak.memory.episodes.store import EpisodeStore
 from mapspeak.memory.episodes.textindex import VectorRank
-from mapspeak.memory.search.answer import Thresholds
+from mapspeak.memory.search.answer import MINILM_THRESHOLDS
 
 __all__ = ["measure"]
 
@@ -48,7 +49,7 @@ class _DrawnVectors:
     """Stands for a language model: each text has a direction of its own, made at once."""
 
     name = "drawn"
-    thresholds = Thresholds(least_ratio=0.1, sure_ratio=0.5, same_ratio=0.01)
+    thresholds = replace(MINILM_THRESHOLDS, least_ratio=0.1, same_ratio=0.01)
 
     def embed(self, texts: Sequence[str]) -> NDArray[np.float32]:
         return np.stack([_direction(sum(map(ord, text))) for text in texts])

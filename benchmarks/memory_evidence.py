@@ -38,7 +38,10 @@ HALF_VIEW_RAD = math.radians(30)
 DOUBTED, TRUSTED = 0.3, 0.8
 MONDAY = datetime(2026, 11, 23, 9, 0, tzinfo=UTC)
 WEEK = timedelta(days=7)
+NOW = MONDAY + WEEK + timedelta(hours=4)
 MOST_TRIES = 80
+RECOLLECTOR = Recollector(lambda: None)
+"""Keeps the part of a memory that does not change from case to case."""
 
 
 def measure() -> Iterable[Figure]:
@@ -106,7 +109,7 @@ def _judge_one_place(
 def _judge(site: Site, waypoints: Sequence[Waypoint], memory: Memory, thing: TrueThing) -> float:
     world, _ = _recall(site, waypoints)
     found = _find(world.things, memory, thing)
-    return 0.0 if found is None else world.judge.judge_thing(found).ratio
+    return 0.0 if found is None else world.judge.judge_thing(found, now=NOW).ratio
 
 
 def _recall(site: Site, waypoints: Sequence[Waypoint]) -> tuple[WorldModel, SemanticMap]:
@@ -117,7 +120,7 @@ def _recall(site: Site, waypoints: Sequence[Waypoint]) -> tuple[WorldModel, Sema
         places,
         radius_m=RADIUS_M,
         revision=site.revision,
-        recollector=Recollector(lambda: None),
+        recollector=RECOLLECTOR,
     )
     return world, places
 

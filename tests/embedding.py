@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.memory.search.answer import Thresholds
+from mapspeak.memory.search.answer import Chance, Thresholds
 from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.memory.search.wordindex import split_words, stem
 
@@ -27,7 +27,12 @@ class ConceptEmbedder:
     """
 
     name = "concepts"
-    thresholds = Thresholds(least_ratio=0.3, sure_ratio=0.9, same_ratio=0.02)
+    thresholds = Thresholds(
+        least_ratio=0.3,
+        same_ratio=0.02,
+        right=Chance(constant=-16.0, likeness=20.0, lead=20.0, missing=0.0),
+        there=Chance(constant=-5.4, likeness=20.0, missing=-10.0),
+    )
 
     def __init__(self) -> None:
         self.asked: list[str] = []

@@ -4,7 +4,7 @@ import importlib
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.requests.data import Request, read_maps, things_of
-from mapspeak.memory.search.answer import Entry, Thresholds, Verdict
+from mapspeak.memory.search.answer import MINILM_THRESHOLDS, Entry, Verdict
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors, find_model
 from mapspeak.memory.search.wordindex import split_words
@@ -148,7 +148,7 @@ class _WordLlama:
     """The mean of a text's word vectors; read without importing the package."""
 
     name = "wordllama l2_supercat_256"
-    thresholds = Thresholds(least_ratio=0.2, sure_ratio=0.85, same_ratio=0.05)
+    thresholds = replace(MINILM_THRESHOLDS, least_ratio=0.2, same_ratio=0.05)
 
     def __init__(self, folder: Path) -> None:
         read = importlib.import_module("safetensors.numpy").load_file

@@ -178,6 +178,7 @@ class Session:
                 recollector=self.recollector,
                 pose_doubt=stamped.find_doubt(self.robot.now_s),
                 is_radius_assumed=self.robot.description.is_radius_assumed,
+                now=self.find_wall_time(),
             )
             self._looked_s = self.robot.now_s
             return self.world

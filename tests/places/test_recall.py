@@ -77,7 +77,7 @@ def test_an_empty_memory_is_not_remembered_either() -> None:
 def test_several_of_one_name_are_ambiguous_and_the_nearest_by_path_comes_first() -> None:
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
     answer = recall(world_of(*LOOKS, near), RecallQuery(words="fire extinguisher"))
-    assert answer.verdict is Verdict.AMBIGUOUS
+    assert answer.verdict is Verdict.SEVERAL
     assert answer.answer.n_meant == 2
     assert answer.candidates[0].room_ids == ("R2",)
 
@@ -89,7 +89,7 @@ def test_of_several_that_are_as_like_in_meaning_the_nearest_by_path_comes_first(
         world = world_of(*places)
         answer = recall(world, RecallQuery(words="where can I wash my hands"))
         paths_m = [each.check.path_m for each in answer.candidates]
-        assert answer.verdict is Verdict.AMBIGUOUS
+        assert answer.verdict is Verdict.SEVERAL
         assert None not in paths_m
         assert paths_m == sorted(paths_m, key=lambda path_m: path_m or 0.0)
 
@@ -111,7 +111,7 @@ def test_two_of_one_name_that_three_views_each_agree_on_stay_ambiguous() -> None
         for i, (x, y, range_m) in enumerate([(2.0, 1.0, 2.2), (2.6, 2.4, 2.3), (1.0, 0.6, 1.9)])
     ]
     answer = recall(world_of(*LOOKS, third, *west), RecallQuery(words="fire extinguisher"))
-    assert answer.verdict is Verdict.AMBIGUOUS
+    assert answer.verdict is Verdict.SEVERAL
 
 
 def test_filters_apply_before_ranking() -> None:

@@ -40,7 +40,7 @@ def seen(name: str, x: float, y: float, at: Point) -> Waypoint:
 
 
 @pytest.mark.parametrize(
-    ("away_m", "verdict"), [(1.7, Verdict.AMBIGUOUS), (2.4, Verdict.FOUND), (4.0, Verdict.FOUND)]
+    ("away_m", "verdict"), [(1.7, Verdict.SEVERAL), (2.4, Verdict.FOUND), (4.0, Verdict.FOUND)]
 )
 def test_the_best_known_of_a_name_is_found_only_where_no_other_of_the_name_is_within_two_metres(
     away_m: float, verdict: Verdict

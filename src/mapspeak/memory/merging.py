@@ -24,8 +24,8 @@ SAME_SPOT_M = 0.5
 """Moving by less changes the bearing of a thing 3 m away by under 10 degrees."""
 SAME_POSE_M = 0.05
 """A pose nearer than this is the same one, estimated again."""
-LEAST_HALF_VIEW_RAD = math.radians(20.0)
-"""Every usual camera shows this much to either side."""
+LEAST_HALF_VIEW_RAD = math.radians(27.0)
+"""Every usual camera of a robot shows this much to either side: depth cameras from 57 degrees."""
 CONE_MARGIN_RAD = math.radians(5.0)
 NEAR_M = 4.0
 """An observer looking at a thing from within this distance would name it."""

@@ -74,6 +74,14 @@ def _knowledge() -> Mapping[str, Any]:
 
 
 @cache
+def half_lives() -> Mapping[int, frozenset[str]]:
+    """Return by hours the nouns of things of which half stand elsewhere after so long."""
+    return {
+        int(hours): frozenset(words.split()) for hours, words in _knowledge()["half_lives"].items()
+    }
+
+
+@cache
 def words_of(entry: str) -> frozenset[str]:
     """Return the words under one entry of `data/words.yaml`, or the phrases of a list."""
     known = _knowledge()[entry]

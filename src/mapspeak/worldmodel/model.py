@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import cached_property
 from typing import TypeVar
 from weakref import WeakKeyDictionary
@@ -122,6 +123,7 @@ class WorldModel:
         recollector: Keeps what is made of the memory; that of `previous` where None.
         pose_doubt: Why the robot may be elsewhere; None for a fresh pose on the map.
         is_radius_assumed: The robot's radius is unknown.
+        now: By the calendar of the records; None where that is not known.
 
     Attributes:
         warnings: What a reader of the memory should know.
@@ -140,6 +142,7 @@ class WorldModel:
         recollector: Recollector | None = None,
         pose_doubt: PoseDoubt | None = None,
         is_radius_assumed: bool = False,
+        now: datetime | None = None,
     ) -> None:
         before = None if previous is None else previous.map
         is_unchanged = before is not None and before.is_of(grid)
@@ -151,6 +154,7 @@ class WorldModel:
         self.robot = robot
         self.pose_doubt = pose_doubt
         self.is_radius_assumed = is_radius_assumed
+        self.now = now
         self.memory = memory
         self.places: tuple[RememberedPlace, ...] = (
             previous.places

@@ -8,6 +8,7 @@ import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
@@ -164,13 +165,13 @@ class Judge:
             for name in () if finding.things else finding.waypoints:
                 self._of_waypoint[name].append(number)
 
-    def judge_thing(self, remembered: RememberedThing) -> Trust:
-        """Return the trust that a thing deserves."""
+    def judge_thing(self, remembered: RememberedThing, *, now: datetime | None) -> Trust:
+        """Return the trust that a thing deserves at a moment; without one its age is no matter."""
         thing = remembered.thing
         numbers = set(self._of_thing.get(id(thing), ()))
         for name in thing.waypoints:
             numbers.update(self._of_waypoint.get(name, ()))
-        return judge_trust(thing, [self.findings[number] for number in sorted(numbers)])
+        return judge_trust(thing, [self.findings[each] for each in sorted(numbers)], now=now)
 
     def judge_place(self, place: RememberedPlace) -> Trust:
         """Return the trust that a record deserves: it is sure until something speaks against it."""

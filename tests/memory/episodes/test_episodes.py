@@ -1,5 +1,6 @@
 import sqlite3
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from mapspeak.memory.episodes.observation import (
 )
 from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
 from mapspeak.memory.episodes.textindex import VectorRank
-from mapspeak.memory.search.answer import Thresholds
+from mapspeak.memory.search.answer import MINILM_THRESHOLDS
 
 NINE = datetime(2026, 11, 20, 9, 0, tzinfo=UTC)
 
@@ -188,7 +189,7 @@ class LetterEmbedder:
     """Counts letters, and what it was asked to embed."""
 
     name = "letters"
-    thresholds = Thresholds(least_ratio=0.1, sure_ratio=0.5, same_ratio=0.01)
+    thresholds = replace(MINILM_THRESHOLDS, least_ratio=0.1, same_ratio=0.01)
 
     def __init__(self) -> None:
         self.embedded: list[str] = []

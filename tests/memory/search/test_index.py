@@ -130,7 +130,7 @@ def test_a_request_in_words_of_the_language_does_not_count_as_a_name_that_looks_
     answer = EntryIndex([ladder]).find("night ladder")
 
     assert answer.understood == "night ladder"
-    assert answer.verdict is Verdict.AMBIGUOUS
+    assert answer.verdict is Verdict.UNSURE
 
 
 def test_a_kind_of_thing_that_is_not_remembered_is_said_to_be_missing() -> None:
@@ -155,13 +155,25 @@ def test_a_kind_of_thing_that_only_a_description_names_is_remembered() -> None:
 
 def test_what_is_more_like_a_thing_that_is_not_remembered_is_said_not_to_be() -> None:
     embedder = ConceptEmbedder()
-    embedder.thresholds = replace(embedder.thresholds, absent_ratio=0.2)
+    there = replace(embedder.thresholds.there, missing=-40.0)
+    embedder.thresholds = replace(embedder.thresholds, there=there)
     blend = Entry(id="b", kind=EntryKind.PLACE, name="shelf sink")
 
     answer = EntryIndex([blend], vectors=TextVectors(embedder)).find("thirsty")
 
     assert answer.verdict is Verdict.NOT_REMEMBERED
     assert answer.missing is not None
+
+
+@pytest.mark.parametrize("find", [by_words, by_meaning])
+@pytest.mark.parametrize("request_", ["stepladder", "step-ladder", "take me to the rolling ladder"])
+def test_another_name_for_such_things_is_sure_in_one_word_or_two(
+    find: Callable[[str], Answer], request_: str
+) -> None:
+    answer = find(request_)
+
+    assert ids(answer)[0] == "workshop / ladder"
+    assert answer.verdict is Verdict.FOUND
 
 
 @pytest.mark.parametrize("find", [by_words, by_meaning])
@@ -177,13 +189,6 @@ def test_a_thing_is_found_by_its_usual_use_and_says_so() -> None:
 
     assert ids(answer)[0] == "workshop / ladder"
     assert answer.candidates[0].field is MatchField.USE
-
-
-def test_what_is_commonly_known_makes_no_answer_sure() -> None:
-    answer = by_words("changing a light bulb")
-
-    assert not answer.is_sure
-    assert answer.verdict is Verdict.AMBIGUOUS
 
 
 def test_who_says_much_of_a_request_or_is_surely_meant_speaks_of_it() -> None:
@@ -236,15 +241,15 @@ def test_a_word_is_found_in_a_longer_one() -> None:
     assert answer.candidates[0].evidence[0].kind is MatchKind.PART
 
 
-def test_things_of_one_name_are_ambiguous_and_one_kind() -> None:
+def test_things_of_one_name_are_several_of_one_kind() -> None:
     answer = by_meaning("extinguisher")
 
-    assert answer.verdict is Verdict.AMBIGUOUS
+    assert answer.verdict is Verdict.SEVERAL
     assert (answer.n_meant, is_one_kind(answer)) == (2, True)
     assert set(ids(answer)[:2]) == {"kitchen / extinguisher", "workshop / extinguisher"}
 
 
-def test_things_of_like_meaning_are_ambiguous_and_of_several_kinds() -> None:
+def test_things_of_like_meaning_are_several_of_several_kinds() -> None:
     blanket = Entry(id="b", kind=EntryKind.THING, name="blanket")
     vectors = TextVectors(ConceptEmbedder())
     # Anybody knows that a first aid box is good for burns, too.
@@ -252,7 +257,7 @@ def test_things_of_like_meaning_are_ambiguous_and_of_several_kinds() -> None:
 
     answer = EntryIndex([*others, blanket], vectors=vectors).find("flames")
 
-    assert answer.verdict is Verdict.AMBIGUOUS
+    assert answer.verdict is Verdict.SEVERAL
     assert (answer.n_meant, is_one_kind(answer)) == (3, False)
 
 
@@ -273,7 +278,7 @@ def test_leaving_the_likeliest_out_makes_the_next_no_surer() -> None:
     answer = index.find("thirsty", among=set(names[1:]))
 
     assert ids(answer) == list(names[1:])
-    assert answer.verdict is Verdict.AMBIGUOUS
+    assert answer.verdict is Verdict.UNSURE
 
 
 @pytest.mark.parametrize("query", ["", "?!", "the", "where is it", "swimming pool"])
@@ -296,7 +301,7 @@ def test_a_letter_after_a_name_tells_places_apart() -> None:
 
     assert ids(index.find("aisle A"))[0] == "aisle A"
     assert index.find("aisle A").verdict is Verdict.FOUND
-    assert index.find("the aisle").verdict is Verdict.AMBIGUOUS
+    assert index.find("the aisle").verdict is Verdict.SEVERAL
 
 
 def test_the_end_of_a_contraction_is_no_word() -> None:

@@ -7,7 +7,7 @@ import pytest
 from embedding import shipped_model
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, Verdict
 from mapspeak.memory.search.index import EntryIndex
-from mapspeak.memory.search.kinds import calls_by_name, is_carrier, says_purpose
+from mapspeak.memory.search.kinds import calls_by_name, is_carrier
 from mapspeak.memory.search.meaningindex import TextVectors
 
 OTHERS = ("desk", "whiteboard")
@@ -123,27 +123,6 @@ def test_a_request_calls_a_thing_by_the_end_of_its_head(
     request_: str, name: str, *, is_so: bool
 ) -> None:
     assert calls_by_name(request_, [name]) is is_so
-
-
-def test_the_end_of_a_name_is_no_other_name() -> None:
-    assert calls_by_name("dining table", ["table"])
-    assert not calls_by_name("dining table", ["tennis table"], other_names=["table"])
-
-
-@pytest.mark.parametrize(
-    ("request_", "purpose", "is_so"),
-    [
-        ("where can I wash my hands?", "used for washing hands", True),
-        ("wash my car", "used for washing hands", False),
-        ("washing", "used for washing hands", False),
-        ("fire extinguisher", "shows where the fire extinguisher is", False),
-        ("wash my hands", None, False),
-    ],
-)
-def test_a_request_says_a_purpose_in_its_very_words(
-    request_: str, purpose: str | None, *, is_so: bool
-) -> None:
-    assert says_purpose(request_, purpose) is is_so
 
 
 @pytest.mark.parametrize(

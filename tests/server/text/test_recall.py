@@ -34,9 +34,9 @@ def list_answers() -> Iterator[tuple[Recall, str]]:
     yield ask(UNPLACED), "not sure: where it is was not noted. navigate_to T1 goes where it was"
     yield ask(*LOOKS, words="a helicopter"), "Look for it with search_for."
     yield ask(), "Not remembered: nothing is remembered yet. Look for it with search_for."
-    yield ask(*LOOKS, NEAR), "Ambiguous: 2 are called so; T2 is the nearest by path. Choose by room"
+    yield ask(*LOOKS, NEAR), "Several: 2 are called so; T2 is the nearest by path. Choose by room"
     yield ask(*LOOKS, THIRD, NEAR), " 1 other is called so, of which fewer views agree."
-    yield ask(*WASHBASINS, words="where can I wash my hands"), "of 2 the nearest by path; what is"
+    yield ask(*WASHBASINS, words="where can I wash my hands"), "Several: 2 are such a thing; T"
     yield ask(*LOOKS, words="a piano"), 'Not remembered (it sounds like "piano", and none is)'
 
 

@@ -118,8 +118,8 @@ def _find_remembered(world: WorldModel, thing: str) -> tuple[list[Place], list[P
     by_id = {each.id: Place(each.id, each) for each in world.recollection.everything}
     answer = world.recollection.find(thing, limit=MOST_REMEMBERED)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
-    is_ambiguous = answer.verdict is Verdict.AMBIGUOUS
-    meant = answer.candidates[: answer.n_meant] if is_ambiguous else ()
+    is_open = answer.verdict in (Verdict.SEVERAL, Verdict.UNSURE)
+    meant = answer.candidates[: answer.n_meant] if is_open else ()
     return (
         [by_id[each.entry.id] for each in speaking],
         [by_id[each.entry.id] for each in meant if each not in speaking],

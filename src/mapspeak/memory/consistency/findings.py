@@ -1,10 +1,13 @@
 """Findings about doubtful records. A finding lowers trust; it never removes anything."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
 
 from mapspeak.geometry import Point
+from mapspeak.memory.things.labels import find_half_life_s
 from mapspeak.memory.things.thing import Thing, View
 
 
@@ -21,6 +24,8 @@ class FindingKind(StrEnum):
     WRONG_ROOM = "wrong_room"
     DUPLICATE = "duplicate"
     NOT_SEEN = "not_seen"
+    MOVED = "moved"
+    AGED = "aged"
     POINTS_PAST = "points_past"
     TWO_LABELS = "two_labels"
 
@@ -36,6 +41,8 @@ WEIGHTS = {
     FindingKind.WRONG_ROOM: 0.6,
     FindingKind.DUPLICATE: 1.0,
     FindingKind.NOT_SEEN: 0.7,
+    FindingKind.MOVED: 1.0,
+    FindingKind.AGED: 0.9,
     FindingKind.POINTS_PAST: 0.5,
     FindingKind.TWO_LABELS: 0.02,
 }
@@ -45,10 +52,10 @@ place that are never named together, both are right one time in fifty; the loss 
 on how well the other is seen."""
 
 
-SEEN_ODDS = 20.0
+SEEN_ODDS = 21.0
 """Highest odds that a thing is still where it was last seen, once a later look missed it."""
-MISSED_WEIGHT = 0.25
-"""Factor on the odds for each such look: observers miss about one thing in five."""
+MISSED_RATIO = 0.2
+"""Observers miss about one thing in five of those that a look shows."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +70,9 @@ class MemoryFinding:
         told_m: The recorded distance of the landmark.
         open_m: Length of the free part of the line to the landmark.
         n_since: How many looks later than the last one that saw the thing it stands for.
+        shown_ratio: How likely such a look shows it where it is still there.
+        age_s: How long ago the thing was last seen.
+        half_life_s: Half of such things stand elsewhere after so long.
     """
 
     kind: FindingKind
@@ -77,6 +87,14 @@ class MemoryFinding:
     told_m: float | None = None
     open_m: float | None = None
     n_since: int = 0
+    shown_ratio: float = 1.0
+    age_s: float = 0.0
+    half_life_s: float = math.inf
+
+    @property
+    def stayed_ratio(self) -> float:
+        """How likely a thing of such an age still stands where it was seen."""
+        return float(0.5 ** (self.age_s / self.half_life_s))
 
     @property
     def weight(self) -> float:
@@ -86,10 +104,14 @@ class MemoryFinding:
     def weight_for(self, thing: Thing) -> float:
         """Return the factor on the odds of one of the things that it concerns.
 
+        A look that shows it with probability s and misses a share m of what it shows fails to name
+        it with 1 - s (1 - m) where it is there, and surely where it is not (Bayes).
         Two labels in one place are hardly both right, so each becomes less likely the likelier
         the other is. Few views against many change little.
         """
         weight = self.weight
+        if self.n_since:
+            return float((1 - self.shown_ratio * (1 - MISSED_RATIO)) ** self.n_since)
         if self.kind is not FindingKind.TWO_LABELS:
             return weight
         product = 1.0
@@ -102,29 +124,57 @@ class MemoryFinding:
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """Degree of trust."""
+    """Degree of trust.
+
+    Attributes:
+        stayed_ratio: The part of it that is left since the thing was last seen.
+    """
 
     ratio: float
     findings: tuple[MemoryFinding, ...]
     thing: Thing | None = None
+    stayed_ratio: float = 1.0
 
 
-def judge_trust(thing: Thing, findings: Iterable[MemoryFinding]) -> Trust:
-    """Return the trust that a thing deserves by its views and all findings of its memory.
+def judge_trust(
+    thing: Thing, findings: Iterable[MemoryFinding], *, now: datetime | None = None
+) -> Trust:
+    """Return the trust that a thing deserves by its views, its age, and findings of its memory.
 
-    A finding about one of several places that have seen it counts by its share of them.
+    A finding about one of several places that have seen it counts by its share of them. That it
+    is still there is less likely the older its last sight is; looks that miss it come after that.
     """
     odds = thing.confidence_ratio / (1 - thing.confidence_ratio)
-    against = []
+    against, missed = [], []
     for finding in findings:
         share = _share(thing, finding)
-        if share and finding.weight < 1.0:
-            odds *= 1.0 if finding.n_since else finding.weight_for(thing) ** share
-            against.append(finding)
-    n_since = sum(finding.n_since for finding in against)
-    if n_since:
-        odds = min(odds, SEEN_ODDS) * MISSED_WEIGHT**n_since
-    return Trust(odds / (1 + odds), tuple(against), thing)
+        if share and finding.n_since:
+            missed.append(finding)
+        elif share and finding.weight < 1.0:
+            odds *= finding.weight_for(thing) ** share
+        elif finding.kind is not FindingKind.MOVED or not share:
+            continue
+        against.append(finding)
+    odds = min(odds, SEEN_ODDS) if missed else odds
+    aged = _find_aged(thing, now)
+    stayed_ratio = 1.0 if aged is None else aged.stayed_ratio
+    ratio = odds / (1 + odds) * stayed_ratio
+    odds = ratio / (1 - ratio) * math.prod(each.weight_for(thing) for each in missed)
+    if aged is not None and stayed_ratio < WEIGHTS[FindingKind.AGED]:
+        against.append(aged)
+    return Trust(odds / (1 + odds), tuple(against), thing, stayed_ratio)
+
+
+def _find_aged(thing: Thing, now: datetime | None) -> MemoryFinding | None:
+    if thing.last_seen is None or now is None:
+        return None
+    return MemoryFinding(
+        kind=FindingKind.AGED,
+        waypoints=thing.waypoints[:1],
+        things=(thing,),
+        age_s=max((now - thing.last_seen).total_seconds(), 0.0),
+        half_life_s=find_half_life_s(thing.label),
+    )
 
 
 def _share(thing: Thing, finding: MemoryFinding) -> float:

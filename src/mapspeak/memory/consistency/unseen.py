@@ -1,56 +1,51 @@
-"""Looks that should have shown a thing, and did not."""
+"""Looks that should have shown a thing and did not, and things that stand elsewhere since."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 
 import numpy as np
 
 from mapspeak.geometry import wrap_angle
-from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
+from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, judge_trust
 from mapspeak.memory.merging import NEAR_M, SAME_BEARING_RAD, find_cone, find_named
 from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.thing import Thing
-from mapspeak.memory.waypoint import SemanticMap, Waypoint
+from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial.grid import FloatArray
 
-LEAST_SHARE_IN_SIGHT = 0.5
-"""An observer with this share of a thing's possible positions in plain sight would see it."""
+LEAST_SHOWN_RATIO = 0.25
+"""A look that shows a thing less likely says nothing of it."""
+MOVED_RATIO = 0.5
+"""A thing that later looks leave less likely may be the one of its name that is seen elsewhere."""
 
 
 def check_unseen(
     places: SemanticMap, found: Things, placed: Sequence[Thing], at: FloatArray
 ) -> Iterator[MemoryFinding]:
-    """Return things that looks should have shown, those later than their last sighting marked.
+    """Return things that looks should have shown, and those that may have been moved.
 
     Args:
         placed: The things with a position.
         at: Where these are, shape (n, 2), metres.
     """
     by_name = {each.name: each for each in places.waypoints}
-    last_seen = [_find_last_seen(thing, by_name) for thing in placed]
-    for thing, seen_at in zip(placed, last_seen, strict=True):
-        yield from _missed(thing, seen_at, by_name)
+    owners = {
+        (view.waypoint, view.landmark): thing for thing in placed for view in thing.supporting
+    }
+    unseen = [finding for thing in placed for finding in _missed(thing, by_name)]
     for waypoint in places.waypoints:
-        yield from _not_seen(found, waypoint, placed, at, last_seen)
+        unseen += _not_shown(found, waypoint, placed, at, owners)
+    yield from unseen
+    yield from _moved(placed, unseen)
 
 
-def _find_last_seen(thing: Thing, by_name: Mapping[str, Waypoint]) -> datetime | None:
-    views = (
-        by_name[view.waypoint].dated(view.landmark)
-        for view in thing.supporting
-        if view.waypoint in by_name
-    )
-    return max((each.recorded_at for each in views if each.recorded_at), default=None)
-
-
-def _missed(
-    thing: Thing, last_seen: datetime | None, by_name: Mapping[str, Waypoint]
-) -> Iterator[MemoryFinding]:
+def _missed(thing: Thing, by_name: Mapping[str, Waypoint]) -> Iterator[MemoryFinding]:
     """Return the places it was once seen from, whose later looks did not name it."""
     for view in thing.supporting:
         look = by_name.get(view.waypoint)
-        if look is not None and view.landmark.n_missed and _is_later(look, last_seen):
+        if look is not None and view.landmark.n_missed and _is_later(look, thing.last_seen):
             yield MemoryFinding(
                 kind=FindingKind.NOT_SEEN,
                 waypoints=(view.waypoint,),
@@ -66,46 +61,86 @@ def _is_later(look: Waypoint, last_seen: datetime | None) -> bool:
     return look.recorded_at > last_seen
 
 
-def _not_seen(
+def _not_shown(
     found: Things,
     waypoint: Waypoint,
     placed: Sequence[Thing],
     at: FloatArray,
-    last_seen: Sequence[datetime | None],
+    owners: Mapping[tuple[str, Landmark], Thing],
 ) -> Iterator[MemoryFinding]:
-    """Return unnamed things in plain sight within the cone of what a waypoint names."""
+    """Return unnamed things that a waypoint shows within the cone of what it names."""
     cone = find_cone(waypoint)
     if cone is None:
         return
-    low, high = cone
     pose, named = waypoint.pose, find_named(waypoint)
     for i in np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist():
         thing = placed[i]
         assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
         bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
-        is_named = any(
-            name_the_same(each.label, thing.label)
-            and (
-                each.bearing_rad is None
-                or abs(wrap_angle(each.bearing_rad - bearing_rad)) <= SAME_BEARING_RAD
-            )
-            for each in named
+        is_told = any(
+            _may_be(thing, each, bearing_rad, owners.get((waypoint.name, each))) for each in named
         )
         is_counted = any(
             view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting
         )
-        if (
-            low <= bearing_rad <= high
-            and not (is_named or is_counted)
-            and (
-                found.is_in_plain_sight(waypoint, thing.position)
-                or found.measure_share_in_sight(waypoint, thing) >= LEAST_SHARE_IN_SIGHT
-            )
-        ):
+        if is_told or is_counted:
+            continue
+        shown_ratio = _measure_shown(found, waypoint, thing, cone)
+        if shown_ratio >= LEAST_SHOWN_RATIO:
             yield MemoryFinding(
                 kind=FindingKind.NOT_SEEN,
                 waypoints=(waypoint.name,),
                 things=(thing,),
                 far_m=pose.point.distance_to(thing.position),
-                n_since=int(_is_later(waypoint, last_seen[i])),
+                n_since=int(_is_later(waypoint, thing.last_seen)),
+                shown_ratio=shown_ratio,
+            )
+
+
+def _may_be(thing: Thing, landmark: Landmark, bearing_rad: float, owner: Thing | None) -> bool:
+    """Return True for a landmark that may be a thing, and is not of another one seen elsewhere."""
+    is_ahead = (
+        landmark.bearing_rad is None
+        or abs(wrap_angle(landmark.bearing_rad - bearing_rad)) <= SAME_BEARING_RAD
+    )
+    is_others = owner is not None and owner is not thing and len(owner.waypoints) > 1
+    return is_ahead and not is_others and name_the_same(landmark.label, thing.label)
+
+
+def _measure_shown(
+    found: Things, waypoint: Waypoint, thing: Thing, cone: tuple[float, float]
+) -> float:
+    """Return how likely a look shows a thing: over all that it may be, near, ahead, in sight."""
+    if thing.whereabouts is None or not len(thing.whereabouts):
+        return 0.0
+    pose = waypoint.pose
+    east, north = (thing.whereabouts - (pose.x, pose.y)).T
+    off_rad = np.remainder(np.arctan2(north, east) - pose.yaw_rad + np.pi, 2 * np.pi) - np.pi
+    is_ahead = (cone[0] <= off_rad) & (off_rad <= cone[1]) & (np.hypot(east, north) <= NEAR_M)
+    return float((is_ahead * found.find_sight_ratios(waypoint, thing.whereabouts)).mean())
+
+
+def _moved(placed: Sequence[Thing], unseen: Sequence[MemoryFinding]) -> Iterator[MemoryFinding]:
+    """Return pairs of a thing that is gone and the only one of its name that is new since."""
+    missed = {id(thing) for each in unseen if each.n_since for thing in each.things}
+    gone = [
+        thing
+        for thing in placed
+        if id(thing) in missed and judge_trust(thing, unseen).ratio < MOVED_RATIO
+    ]
+    pairs = [
+        (old, new)
+        for old in gone
+        for new in placed
+        if new.first_seen is not None
+        and old.last_seen is not None
+        and new.first_seen > old.last_seen
+        and new not in gone
+        and name_the_same(old.label, new.label)
+    ]
+    n_pairs = Counter(id(thing) for pair in pairs for thing in pair)
+    for old, new in pairs:
+        if n_pairs[id(old)] == n_pairs[id(new)] == 1:
+            yield MemoryFinding(
+                kind=FindingKind.MOVED, waypoints=new.waypoints[:1], things=(old, new)
             )

@@ -166,13 +166,15 @@ def _thing(landmark: Landmark, place: Waypoint, *, id_: str) -> Entry:
 class Verdict(StrEnum):
     """Trust in an answer.
 
-    Likely: one fits, but its record is not sure. A search of words alone never returns that; the
-    search of things, which knows their views, does.
+    Found: it is the one meant. Likely: one fits, but its record is not sure; a search of words
+    alone never returns that, the search of things, which knows their views, does. Several: each of
+    these is what was asked for. Unsure: some are like it, and perhaps none is meant.
     """
 
     FOUND = "found"
     LIKELY = "likely"
-    AMBIGUOUS = "ambiguous"
+    SEVERAL = "several"
+    UNSURE = "unsure"
     NOT_REMEMBERED = "not_remembered"
 
 
@@ -185,24 +187,60 @@ class Basis(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Thresholds:
-    """Thresholds on similarity; each way of comparing has its own scale.
-
-    The certainty of an answer is the similarity of the request to the texts of the first candidate,
-    plus its lead over the first one with another name.
+class Chance:
+    """How likely something is by similarities: a logistic regression (Platt, 1999).
 
     Attributes:
-        least_ratio: Certainty above which something may be meant; below, it is not remembered.
-        sure_ratio: Certainty from which the first candidate's kind is the one meant.
+        likeness: Weight of the similarity of the request to the first candidate.
+        lead: Weight of its lead over the first one with another name.
+        missing: Weight of the lead of a kind that is not remembered over the first candidate.
+    """
+
+    constant: float
+    likeness: float
+    lead: float = 0.0
+    missing: float
+
+    def ratio(self, likeness: float, lead: float, missing: float) -> float:
+        """Return the probability; a missing kind that is much less like counts for nothing more."""
+        terms = self.likeness * likeness + self.lead * lead + self.missing * max(missing, -1.0)
+        return 1.0 / (1.0 + math.exp(-(self.constant + terms)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thresholds:
+    """What similarities mean; each way of comparing has its own scale.
+
+    Attributes:
+        least_ratio: Similarity from which a text is about a phrase.
         same_ratio: Scores no further apart count as equal.
-        absent_ratio: Lead in similarity from which a kind that is not remembered is the one meant;
-            never if infinite.
+        right: How likely the first candidate is what is meant.
+        there: How likely what is meant is remembered at all.
     """
 
     least_ratio: float
-    sure_ratio: float
     same_ratio: float
-    absent_ratio: float = math.inf
+    right: Chance
+    there: Chance
+
+
+SURE_RATIO = 0.93
+"""The first candidate is said to be the one meant where it is so likely."""
+REMEMBERED_RATIO = 0.65
+"""A request is said not to be remembered where it is less likely."""
+WORD_THRESHOLDS = Thresholds(
+    least_ratio=0.05,
+    same_ratio=0.02,
+    right=Chance(constant=-4.1, likeness=3.09, lead=5.71, missing=-2.97),
+    there=Chance(constant=-2.86, likeness=6.22, missing=-2.97),
+)
+MINILM_THRESHOLDS = Thresholds(
+    least_ratio=0.25,
+    same_ratio=0.05,
+    right=Chance(constant=-1.29, likeness=2.09, lead=7.3, missing=-8.28),
+    there=Chance(constant=0.63, likeness=2.65, missing=-13.45),
+)
+"""Fitted to the requests for tuning; benchmarks/requests/README.md says how."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,8 +2,8 @@
 
 An exact name comes first. Otherwise meanings are compared if there is a model, else words: mixing
 both found less than the model alone. Texts of the record and, with a little less weight, general
-knowledge of such things are compared. Only texts of the record make an answer sure, and a kind that
-is not remembered may be the one meant.
+knowledge of such things are compared. How sure an answer is, and whether what is meant is
+remembered at all, are chances fitted to requests.
 """
 
 import math
@@ -17,17 +17,25 @@ import numpy as np
 
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import (
+    REMEMBERED_RATIO,
+    SURE_RATIO,
     WHOLE_WORD_WEIGHTS,
+    WORD_THRESHOLDS,
     Answer,
     Basis,
     Entry,
     EntryCandidate,
     MatchEvidence,
     MatchField,
-    Thresholds,
     Verdict,
 )
-from mapspeak.memory.search.kinds import KindIndex, calls_by_name, says_purpose
+from mapspeak.memory.search.kinds import (
+    KindIndex,
+    calls_by_name,
+    denies,
+    find_kinds_called,
+    without_opening,
+)
 from mapspeak.memory.search.meaningindex import Floats, MeaningIndex, TextVectors
 from mapspeak.memory.search.wordindex import (
     AskedWords,
@@ -42,12 +50,11 @@ _Key = TypeVar("_Key")
 
 WORDS_ONLY = "The search compares words only, no meanings."
 
-WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, absent_ratio=0.3)
-"""Chosen on the requests for tuning; benchmarks/requests/README.md says by which rule."""
-
 _SAME_NAME, _SAME_WORDS, _SAME_WORDS_MISSPELT = 1.0, 0.99, 0.98
 _MOST_WITHOUT_NAME = 0.97
 """Highest similarity of an entry that the request does not name."""
+_SAME_KIND = 0.96
+"""Similarity of an entry of which the request is another name, as is commonly known."""
 
 _LEAST_NAME_LIKENESS = 0.75
 """Similarity from which a request with a misspelt word counts as the name it resembles.
@@ -64,7 +71,6 @@ class _Asked:
     Attributes:
         common: The same words, as found in general knowledge.
         ratios: By the texts of the entry and general knowledge.
-        said_ratios: By the texts of the entry alone.
         part_ratios: By all texts of any entry, if meanings were compared.
         missing: A kind that is not remembered and may be meant, with its similarity.
     """
@@ -73,7 +79,6 @@ class _Asked:
     words: tuple[AskedWords, ...]
     common: tuple[AskedWords, ...]
     ratios: Floats
-    said_ratios: Floats
     part_ratios: Floats | None
     missing: tuple[str, float] | None
 
@@ -108,9 +113,13 @@ class EntryIndex:
         names = [entry.names for entry in self._entries]
         words_of = {name: _words_of(name) for each in names for name in each}
         keys = {name: name_key(name) for name in words_of}
-        stems = {name: tuple(map(stem, words)) for name, words in words_of.items()}
+        letters = {name: "".join(map(stem, words)) for name, words in words_of.items()}
         self._of_key = _numbers_by({keys[name] for name in each} for each in names)
-        self._of_stems = _numbers_by({stems[name] for name in each} for each in names)
+        self._of_letters = _numbers_by({letters[name] for name in each} for each in names)
+        self._of_other = _numbers_by(
+            {_letters_of(text) for field, text in own if field is MatchField.OTHER_NAME}
+            for own in common
+        )
         self._look_alikes = LookAlikes({" ".join(words) for words in words_of.values()} - {""})
 
     def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
@@ -141,9 +150,9 @@ class EntryIndex:
     def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
         """Return the request with its spelling corrected, or the name that it resembles."""
         put_right = _put_right(query, words)
-        if content_stems(put_right) in self._of_stems or not any(
-            word.is_doubtful for word in words
-        ):
+        letters = _letters_of(put_right)
+        is_known = letters in self._of_letters or letters in self._of_other
+        if is_known or find_kinds_called(put_right) or not any(each.is_doubtful for each in words):
             return put_right
         likest = self._look_alikes.find(
             " ".join(_words_of(query)), least_ratio=_LEAST_NAME_LIKENESS, limit=1
@@ -156,24 +165,23 @@ class EntryIndex:
         # An English model cannot compare other scripts.
         is_latin = any(word.isascii() for _, word in content_words(understood))
         if self._vectors is None or self._meanings is None or not is_latin:
-            said_ratios = self._words.score_ratios(words)
-            ratios = said_ratios
+            ratios = self._words.score_ratios(words)
             if self._vectors is None:
                 common = self._common_words.ask(understood)
                 ratios = np.maximum(
-                    said_ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS)
+                    ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS)
                 )
                 missing = self._kinds.find_missing_called(understood)
         else:
             vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
             part_ratios, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
             ratios = self._meanings.ratios(part_ratios)
-            said_ratios = self._meanings.said_ratios(part_ratios)
         ratios = np.clip(ratios, 0.0, _MOST_WITHOUT_NAME)
-        ratios[self._of_stems.get(content_stems(understood), [])] = _SAME_WORDS_MISSPELT
-        ratios[self._of_stems.get(content_stems(query), [])] = _SAME_WORDS
+        ratios[self._of_other.get(_letters_of(understood), [])] = _SAME_KIND
+        ratios[self._of_letters.get(_letters_of(understood), [])] = _SAME_WORDS_MISSPELT
+        ratios[self._of_letters.get(_letters_of(query), [])] = _SAME_WORDS
         ratios[self._of_key.get(name_key(query), [])] = _SAME_NAME
-        return _Asked(understood, words, common, ratios, said_ratios, part_ratios, missing)
+        return _Asked(understood, words, common, ratios, part_ratios, missing)
 
     def _order(self, ratios: Floats, among: Container[str] | None) -> list[int]:
         likely = np.flatnonzero(ratios > 0)
@@ -189,34 +197,31 @@ class EntryIndex:
         return int(np.count_nonzero(asked.ratios[order] >= asked.ratios[order[0]] - margin))
 
     def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> tuple[Verdict, bool]:
-        """Return the trust in the likeliest entry, and whether its name is surely the one meant."""
+        """Return the trust in the likeliest entry, and whether its kind is surely the one meant."""
         if not order:
             return Verdict.NOT_REMEMBERED, False
-        first, thresholds = order[0], self._thresholds
-        is_sure = asked.basis(first) is Basis.NAME
+        first = order[0]
+        likeness, missing = float(asked.ratios[first]), _missing_ratio(asked, order)
+        is_sure = likeness >= _SAME_KIND
         if not is_sure:
             lead = self._lead_ratio(asked.ratios, first)
-            missing = _missing_ratio(asked, order)
-            is_sure = (
-                missing <= 0
-                and asked.said_ratios[first] + lead >= thresholds.sure_ratio
-                and self._is_called(asked.request, first)
-            )
-            if (
-                missing > thresholds.absent_ratio
-                or asked.ratios[first] + lead < thresholds.least_ratio
-            ):
+            if self._thresholds.there.ratio(likeness, lead, missing) < REMEMBERED_RATIO:
                 return Verdict.NOT_REMEMBERED, False
-        return Verdict.FOUND if is_sure and n_meant == 1 else Verdict.AMBIGUOUS, is_sure
+            is_right = self._thresholds.right.ratio(likeness, lead, missing) >= SURE_RATIO
+            is_sure = is_right and not self._is_beside(asked.request, first)
+        if not is_sure:
+            return Verdict.UNSURE, False
+        return Verdict.FOUND if n_meant == 1 else Verdict.SEVERAL, True
 
-    def _is_called(self, request: str, number: int) -> bool:
-        """Return True if the request is for the entry itself, not for something beside it."""
-        entry = self._entries[number]
-        other_names = (
-            text for field, text in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME
-        )
-        is_called = calls_by_name(request, entry.names, other_names=other_names)
-        return is_called or says_purpose(request, entry.purpose)
+    def _is_beside(self, request: str, number: int) -> bool:
+        """Return True where a request says words of a label, but not what the thing is."""
+        entry, stems = self._entries[number], content_stems(request)
+        names = [
+            *entry.names,
+            *(text for field, text in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME),
+        ]
+        is_said = any(not set(stems).isdisjoint(content_stems(name)) for name in entry.names)
+        return denies(request) or (is_said and not calls_by_name(request, names))
 
     def _lead_ratio(self, ratios: Floats, first: int) -> float:
         """Return the lead of an entry over the next one with another name.
@@ -236,8 +241,8 @@ class EntryIndex:
         if basis is Basis.MEANING and self._meanings and asked.part_ratios is not None:
             field, text = self._meanings.nearest_text(asked.part_ratios, number)
         elif basis is Basis.WORDS:
-            best = max(evidence, key=lambda each: each.weight)
-            field, text = best.field, best.text
+            best = max(evidence, key=lambda each: each.weight, default=None)
+            field, text = (field, text) if best is None else (best.field, best.text)
         return EntryCandidate(
             entry=entry,
             score_ratio=float(asked.ratios[number]),
@@ -276,6 +281,11 @@ def _put_right(query: str, words: Iterable[AskedWords]) -> str:
         if word.corrected != word.shown:
             query = re.sub(rf"\b{re.escape(word.shown)}\b", word.corrected, query)
     return query
+
+
+def _letters_of(request: str) -> str:
+    """Return the stems of a request without what leads to it, in one: "night stand", too."""
+    return "".join(content_stems(without_opening(request)))
 
 
 def _words_of(text: str) -> list[str]:

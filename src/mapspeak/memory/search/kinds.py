@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mapspeak.memory.policy import find_head, words_of
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import Entry, EntryKind, MatchField
-from mapspeak.memory.search.meaningindex import TextVectors
+from mapspeak.memory.search.meaningindex import LESS_FOR_COMMON, TextVectors
 from mapspeak.memory.search.wordindex import Texts, content_stems, split_words
 
 
@@ -161,17 +161,19 @@ class KindIndex:
         self, entries: Sequence[Entry], said: Sequence[Texts], vectors: TextVectors | None
     ) -> None:
         names = [(name, kind) for kind in read_kinds() for name in kind.names]
-        self._names = [name for name, _ in names]
-        self._kinds = [kind for _, kind in names]
-        self._vectors = None if vectors is None else vectors.find(self._names).astype(np.float64)
+        uses = [(use, kind) for kind in read_kinds() for use in kind.uses]
+        self._kinds = [kind for _, kind in (*names, *uses)]
+        self._n_names = len(names)
+        texts = [text for text, _ in (*names, *uses)]
+        self._vectors = None if vectors is None else vectors.find(texts).astype(np.float64)
         labels = {name for entry in entries for name in entry.names}
         self._kinds_of = {label: find_kinds(label) for label in labels}
         if vectors is not None and self._vectors is not None:
-            self._find_by_meaning(vectors, self._vectors)
+            self._find_by_meaning(vectors, self._vectors[: self._n_names])
         known = {kind for kinds in self._kinds_of.values() for kind in kinds}
         # Things mentioned in a description are remembered, too.
-        texts = {text for own in said for field, text in own if field in _NAMING}
-        known.update(kind for text in texts for kind in find_named_kinds(text))
+        described = {text for own in said for field, text in own if field in _NAMING}
+        known.update(kind for text in described for kind in find_named_kinds(text))
         self._absent = np.array([kind not in known for kind in self._kinds], dtype=bool)
         self._said_of: dict[tuple[str, ...], Texts] = {}
 
@@ -197,16 +199,17 @@ class KindIndex:
         )
 
     def find_missing(self, vector: Floats) -> tuple[str, float] | None:
-        """Find the kind that is not remembered and has the name most similar to a request.
+        """Find the kind that is not remembered and has a name or use most similar to a request.
 
         Returns:
-            That name, and its similarity to the request.
+            Its first name, and the similarity.
         """
         if self._vectors is None or not self._absent.any():
             return None
-        ratios = np.where(self._absent, np.round(self._vectors @ vector, 6), -1.0)
-        number = int(ratios.argmax())
-        return self._names[number], float(ratios[number])
+        ratios = np.round(self._vectors @ vector, 6)
+        ratios[self._n_names :] -= LESS_FOR_COMMON
+        number = int(np.where(self._absent, ratios, -1.0).argmax())
+        return self._kinds[number].names[0], float(ratios[number])
 
     def find_missing_called(self, request: str) -> tuple[str, float] | None:
         """Find the kind that a request names and nothing else, if it is not remembered."""
@@ -239,39 +242,31 @@ def is_carrier(label: str) -> bool:
     return bool(head) and head[-1].removesuffix("s") in words_of("showing")
 
 
-def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[str] = ()) -> bool:
+def calls_by_name(request: str, names: Iterable[str]) -> bool:
     """Return True if a request is for a thing of one of these names, as far as both show.
 
-    "Fire extinguisher" calls a foam fire extinguisher so, "dining table" no tennis table, and
-    "mouse trap" no mouse.
+    "Fire extinguisher" calls a foam fire extinguisher so, and "mouse trap" no mouse.
 
     Args:
         names: The names of the thing; more or less specific than the request.
     """
-    words = _without_opening(request)
-    if not words_of("denied").isdisjoint(word for _, word in split_words(words)):
+    if denies(request):
         return False
-    asked, own = head_stems(words), [head_stems(name) for name in names if not is_gone(name)]
-    # The end of a name is not a name: with "table" a "dining table" would match any table.
-    other = [
-        stems
-        for stems in map(content_stems, other_names)
-        if not any(ends_with(name, stems) for name in own)
-    ]
+    asked = head_stems(without_opening(request))
+    own = [head_stems(name) for name in names if not is_gone(name)]
     return any(
-        asked and stems and (ends_with(asked, stems) or ends_with(stems, asked))
-        for stems in (*own, *other)
+        asked and stems and (ends_with(asked, stems) or ends_with(stems, asked)) for stems in own
     )
 
 
-def says_purpose(request: str, purpose: str | None) -> bool:
-    """Return True if a request states the purpose of a thing word for word."""
-    asked = frozenset(content_stems(request))
-    is_told = len(asked) > 1 and asked <= frozenset(content_stems(purpose or ""))
-    return is_told and not find_kinds_called(request)
+def denies(request: str) -> bool:
+    """Return True for a request that begins with what is not meant: "another", "not the"."""
+    words = (word for _, word in split_words(without_opening(request)))
+    return not words_of("denied").isdisjoint(words)
 
 
-def _without_opening(request: str) -> str:
+def without_opening(request: str) -> str:
+    """Return a request without the words that people say before they come to what they mean."""
     words = [shown for shown, _ in split_words(request)]
     first = next((i for i, word in enumerate(words) if word.lower() not in words_of("opening")), 0)
     return " ".join(words[first:])

@@ -118,7 +118,7 @@ _COMPARED = (
     MatchField.PLACE,
 )
 _COMMON = (MatchField.OTHER_NAME, MatchField.USE)
-_LESS_FOR_COMMON = 0.05
+LESS_FOR_COMMON = 0.05
 """Deduction from similarity for general knowledge, compared to texts of the record."""
 _BETWEEN_SENTENCES = re.compile(r"(?<=[.!?])\s+|\n+")
 _AT_ONCE = 4096
@@ -176,7 +176,7 @@ class MeaningIndex:
         ratios = likeness[self._names] + likeness[self._contexts]
         # Rounded, since the order of the rows may change the last digit of a product.
         ratios = np.round(ratios / self._lengths, 6)
-        return np.asarray(np.where(self._is_common, ratios - _LESS_FOR_COMMON, ratios))
+        return np.asarray(np.where(self._is_common, ratios - LESS_FOR_COMMON, ratios))
 
     def ratios(self, part_ratios: Floats) -> Floats:
         """Return the similarity of each entry to a phrase, by its most similar part."""
@@ -184,10 +184,6 @@ class MeaningIndex:
             return part_ratios
         most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
         return most
-
-    def said_ratios(self, part_ratios: Floats) -> Floats:
-        """Return the same by the texts of each entry alone, without general knowledge."""
-        return self.ratios(np.where(self._is_common, -1.0, part_ratios))
 
     def nearest_text(self, part_ratios: Floats, number: int) -> tuple[MatchField, str]:
         """Return the text of an entry most similar to a phrase, and its part of the record."""

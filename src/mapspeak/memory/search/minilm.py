@@ -12,7 +12,7 @@ from tokenizers import BertWordPieceTokenizer
 
 from mapspeak.errors import ConfigError
 from mapspeak.installation import say_install
-from mapspeak.memory.search.answer import Thresholds
+from mapspeak.memory.search.answer import MINILM_THRESHOLDS, Thresholds
 from mapspeak.memory.search.wordindex import read_wordpieces
 
 _MOST_PIECES = 256
@@ -31,9 +31,6 @@ _UNREADABLE = (
     refusals.NotImplemented,
     refusals.RuntimeException,
 )
-
-MINILM_THRESHOLDS = Thresholds(least_ratio=0.25, sure_ratio=0.75, same_ratio=0.05, absent_ratio=0.3)
-"""Chosen on the requests for tuning; benchmarks/requests/README.md says by which rule."""
 
 Floats = NDArray[np.float32]
 

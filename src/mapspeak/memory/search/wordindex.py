@@ -90,8 +90,14 @@ def content_stems(text: str) -> tuple[str, ...]:
     return tuple(stem(word) for _, word in content_words(text))
 
 
+_AMERICAN = {"is": "iz", "our": "or", "tre": "ter"}
+_BRITISH = re.compile(r"(?<=\w\w\w)(?:is(?=(?:e[drs]?|ers|ing|ation)$)|our(?=s?$)|tre(?=s?$))")
+"""Endings as in "sanitiser", "colour" and "centre"."""
+
+
 def stem(word: str) -> str:
-    """Cut an English ending off: plural, -ing, -ed, -er, a last e."""
+    """Cut an English ending off: plural, -ing, -ed, -er, a last e; spelt as in the US."""
+    word = _BRITISH.sub(lambda found: _AMERICAN[found[0]], word)
     if len(word) > 4 and word.endswith("ies"):
         word = word[:-3] + "y"
     elif len(word) > 4 and word.endswith(("ses", "xes", "zes", "ches", "shes")):

@@ -17,15 +17,24 @@ from mapspeak.memory.things.joining import (
 from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_waypoints
 from mapspeak.memory.things.placing import Placement, measure_agreement, place, trust_range
-from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
-from mapspeak.memory.things.thing import Category, Thing, View
+from mapspeak.memory.things.sight import (
+    BODY_M,
+    LATTICE_M,
+    N_RAYS,
+    SightMap,
+    bearing_index,
+    build_sight_map,
+)
+from mapspeak.memory.things.thing import NOISE, Category, Thing, View
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray
 
-SURFACE_M = 0.15
-"""A surface is drawn by the map and met by a ray within so much of each other."""
 PLAIN_SIGHT_M = 5.0
 """Who stands no farther and has nothing between would see a thing."""
+SURFACE_M = BODY_M + LATTICE_M / math.sqrt(2)
+"""A thing's surface is met at most so far before the middle of a lattice cell that it may be in."""
+LIKELY_RATIO = 0.5
 ELSEWHERE_RAD = math.radians(30)
 """A view that points so far past a thing says that it is elsewhere."""
 
@@ -55,24 +64,14 @@ class Things:
     surroundings: dict[Waypoint, Surroundings]
     pools: dict[tuple[WeighedView, ...], tuple[Thing, ...]]
 
-    def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
-        """Return True when nothing is between a waypoint and a point near by."""
-        far_m = waypoint.pose.point.distance_to(point)
-        free_m = self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)]
-        return bool(far_m <= PLAIN_SIGHT_M and far_m <= free_m + BODY_M)
-
-    def measure_share_in_sight(self, waypoint: Waypoint, thing: Thing) -> float:
-        """Return how much of where a thing's surface may be is in plain sight from a waypoint."""
-        if thing.whereabouts is None or not len(thing.whereabouts):
-            return 0.0
-        grid, pose = self.sight.grid, waypoint.pose
-        ways = thing.whereabouts - (pose.x, pose.y)
+    def find_sight_ratios(self, waypoint: Waypoint, points: FloatArray) -> FloatArray:
+        """Return for each point how likely a waypoint has it in sight: less over furniture."""
+        pose, seen = waypoint.pose, self.surroundings[waypoint]
+        ways = points - (pose.x, pose.y)
         far_m = np.hypot(*ways.T)
-        angles = np.arctan2(ways[:, 1], ways[:, 0]) - grid.origin.yaw_rad
-        rays = np.rint(angles * N_RAYS / math.tau).astype(np.intp) % N_RAYS
-        free_m = self.surroundings[waypoint].near_m[rays]
-        in_sight = (far_m <= PLAIN_SIGHT_M) & (far_m <= free_m + SURFACE_M)
-        return float(in_sight.mean())
+        rays = bearing_index(np.arctan2(ways[:, 1], ways[:, 0]) - self.sight.grid.origin.yaw_rad)
+        is_near, is_far = (far_m <= each[rays] + SURFACE_M for each in (seen.near_m, seen.far_m))
+        return np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
 
     def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
         """Return the things with a place that were seen from a waypoint."""
@@ -215,6 +214,7 @@ def _against(found: Things, located: Located, alone: Sequence[Located]) -> list[
     if located.placement is None or len(located.group) < 2:
         return []
     position, own = located.placement.position, [each.waypoint for each in located.group]
+    at = np.array([[position.x, position.y]])
     return [
         other
         for (other,) in (each.group for each in alone)
@@ -223,7 +223,7 @@ def _against(found: Things, located: Located, alone: Sequence[Located]) -> list[
         and other.waypoint.pose.point.distance_to(position) <= PLAIN_SIGHT_M
         and _off_rad(other, position) >= ELSEWHERE_RAD
         and name_the_same(other.landmark.label, located.group[0].landmark.label)
-        and found.is_in_plain_sight(other.waypoint, position)
+        and found.find_sight_ratios(other.waypoint, at)[0] > LIKELY_RATIO
     ]
 
 
@@ -253,6 +253,8 @@ def _describe_one(located: Located, conflicting: Iterable[WeighedView]) -> Thing
     labels = _by_votes(each.landmark.label for each in ordered)
     position = placement.position if placement else None
     apart = list(_from_different_places(located))
+    times = (each.waypoint.dated(each.landmark).recorded_at for each in ordered)
+    seen_at = [each for each in times if each is not None]
     return Thing(
         label=labels[0],
         other_labels=tuple(labels[1:]),
@@ -265,6 +267,8 @@ def _describe_one(located: Located, conflicting: Iterable[WeighedView]) -> Thing
         confidence_ratio=_confidence(apart),
         n_agreeing=sum(agreement >= LEAST_AGREEMENT for _, agreement in apart),
         whereabouts=placement.whereabouts if placement else None,
+        first_seen=min(seen_at, default=None),
+        last_seen=max(seen_at, default=None),
     )
 
 

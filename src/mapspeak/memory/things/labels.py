@@ -6,10 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from mapspeak.memory.policy import words_of
+from mapspeak.memory.policy import half_lives, words_of
 from mapspeak.memory.search.kinds import ThingKind, find_kinds, find_kinds_called
 from mapspeak.memory.search.wordindex import without_accents
 
+INSTALLED_H = 5 * 365 * 24.0
+"""What is fixed to the building stays for years."""
 MOST_KEPT = 65_536
 """So many different labels are taken apart once."""
 
@@ -49,6 +51,14 @@ def hangs_on_walls(label: str) -> bool:
     """Return True for things that hang on walls, as is commonly known: "fire extinguisher"."""
     kinds = _parts_of(label).kinds or find_kinds(label)
     return any(name in words_of("on_walls") for kind in kinds for name in kind.names)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def find_half_life_s(label: str) -> float:
+    """Return after how long half of such things stand elsewhere, by what they are called."""
+    noun = _parts_of(label).tokens[-1]
+    hours = (float(hours) for hours, words in half_lives().items() if noun in words)
+    return 3600.0 * next(hours, INSTALLED_H)
 
 
 def group_names(labels: Sequence[str]) -> list[frozenset[str]]:

@@ -11,7 +11,7 @@ from itertools import islice
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, Waypoint
-from mapspeak.memory.consistency.findings import Trust
+from mapspeak.memory.consistency.findings import WEIGHTS, FindingKind, Trust
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import GoalCheck, judge_goal
 from mapspeak.places.naming import Place, find_elsewhere
@@ -88,6 +88,7 @@ class RecallDoubt(StrEnum):
     DOUBTFUL_RECORD = "doubtful_record"
     NOT_NOTED = "not_noted"
     CONTRADICTED = "contradicted"
+    LONG_AGO = "long_ago"
     FEW_VIEWS = "few_views"
     IMPRECISE = "imprecise"
     OTHER_ROOM = "other_room"
@@ -227,7 +228,7 @@ def describe_candidate(
         is_looked_for = find_overlook_of(world, remembered) is not None
         is_faced = world.find_approach(remembered) is not None and not is_looked_for
         faced_ratio = world.measure_faced(remembered)
-        trust = world.judge.judge_thing(remembered)
+        trust = world.judge.judge_thing(remembered, now=world.now)
     pose = stand_at(world, Place(remembered.id, remembered))
     return RecallCandidate(
         id=remembered.id,
@@ -252,6 +253,7 @@ def describe_candidate(
 SURE_RATIO = 0.98
 """A thing that two good views agree on is surer than that, and one view alone is not."""
 DOUBTFUL_RATIO = 0.5
+LEAST_STAYED_RATIO = WEIGHTS[FindingKind.AGED]
 LARGEST_OFF_M = 1.2
 """A thing located less precisely may not be in view from in front of it."""
 LEAST_FACED_RATIO = 0.3
@@ -271,7 +273,8 @@ def find_doubt(first: RecallCandidate, *, room_id: str | None) -> RecallDoubt | 
         return RecallDoubt.NOT_NOTED
     doubts = {
         RecallDoubt.CONTRADICTED: first.trust.ratio < DOUBTFUL_RATIO,
-        RecallDoubt.FEW_VIEWS: first.trust.ratio < SURE_RATIO,
+        RecallDoubt.LONG_AGO: first.trust.stayed_ratio < LEAST_STAYED_RATIO,
+        RecallDoubt.FEW_VIEWS: first.trust.ratio < SURE_RATIO * first.trust.stayed_ratio,
         RecallDoubt.IMPRECISE: first.uncertainty_m > LARGEST_OFF_M,
         RecallDoubt.OTHER_ROOM: room_id is not None and set(first.room_ids) != {room_id},
         RecallDoubt.OUT_OF_SIGHT: first.check.is_ok and not first.is_faced,

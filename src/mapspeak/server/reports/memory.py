@@ -49,7 +49,7 @@ def say_reported(
         query: What was asked.
         now: The operator's time.
     """
-    is_open = answer.verdict in (Verdict.NOT_REMEMBERED, Verdict.AMBIGUOUS)
+    is_open = answer.verdict in (Verdict.NOT_REMEMBERED, Verdict.SEVERAL, Verdict.UNSURE)
     is_called_so = any(calls_by_name(query.words, [each.name]) for each in answer.candidates)
     if not is_open or is_called_so or query.kind is EntryKind.PLACE:
         return ""

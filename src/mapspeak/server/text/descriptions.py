@@ -111,7 +111,7 @@ def _list(world: WorldModel, heading: str, things: Sequence[RememberedThing]) ->
 
 
 def _say_thing(world: WorldModel, remembered: RememberedThing) -> str:
-    thing, trust = remembered.thing, world.judge.judge_thing(remembered)
+    thing, trust = remembered.thing, world.judge.judge_thing(remembered, now=world.now)
     where = "place not noted" if thing.position is None else f"at {say_point(thing.position)}"
     doubt = (
         "" if trust.ratio >= LOW_RATIO else f" ({' '.join(map(say_finding, trust.findings[:2]))})"

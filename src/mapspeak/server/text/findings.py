@@ -59,6 +59,13 @@ def say_finding(finding: MemoryFinding) -> str:
     if finding.kind is FindingKind.DUPLICATE:
         one, other = map(quote_name, finding.waypoints)
         return f"{one} and {other} stand {finding.far_m:.2f} m apart and name the same things."
+    if finding.kind is FindingKind.MOVED:
+        old, new = map(_say_thing, finding.things)
+        return f"The {new} may be the {old}, which later looks do not show: it may have been moved."
+    if finding.kind is FindingKind.AGED:
+        age, half_life = map(_say_duration, (finding.age_s, finding.half_life_s))
+        thing = _say_thing(finding.things[0])
+        return f"The {thing} was last seen {age} ago; half of such things are moved in {half_life}."
     said = _say_of_place(finding) if finding.label is None else _say_of_landmark(finding)
     return f"{said}."
 
@@ -85,6 +92,11 @@ def _say_of_place(finding: MemoryFinding) -> str:
         ),
     }
     return f"{quote_name(finding.waypoints[0])} {said[finding.kind]}"
+
+
+def _say_duration(duration_s: float) -> str:
+    hours = duration_s / 3600
+    return f"{hours:.0f} h" if hours < 2 * 24 else f"{hours / 24:.0f} days"
 
 
 def _say_since(n_since: int) -> str:

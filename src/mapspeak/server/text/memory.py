@@ -84,7 +84,7 @@ def describe_check(world: WorldModel, *, first: int) -> str:
         first: The number of the row to begin with, of both lists.
     """
     judge = world.judge
-    trusts = [(judge.judge_thing(each), each) for each in world.things]
+    trusts = [(judge.judge_thing(each, now=world.now), each) for each in world.things]
     doubted = sorted(
         ((trust, each) for trust, each in trusts if trust.findings),
         key=lambda pair: (pair[0].ratio, int(pair[1].id[1:])),

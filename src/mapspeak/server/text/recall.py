@@ -24,6 +24,7 @@ DOUBTS = {
     RecallDoubt.DOUBTFUL_RECORD: "its record is doubtful",
     RecallDoubt.NOT_NOTED: "where it is was not noted",
     RecallDoubt.CONTRADICTED: "what was noted of it does not go together",
+    RecallDoubt.LONG_AGO: "it was last seen long ago for what it is",
     RecallDoubt.FEW_VIEWS: "no two good views of it agree so far",
     RecallDoubt.IMPRECISE: "its place is known to within {off_m:.1f} m only",
     RecallDoubt.OTHER_ROOM: "it may be in {rooms}",
@@ -96,8 +97,10 @@ def _say_verdict(recalled: Recall) -> str:
             nearest = f"; the nearest is {first}, which is probably not meant" if first else ""
             said = f"Not remembered{kind}{nearest}. Say it in other words."
             return " ".join(filter(None, (said, lead(LOOK_FOR))))
-        case Verdict.AMBIGUOUS:
-            return _say_ambiguous(answer, candidates)
+        case Verdict.SEVERAL:
+            return _say_several(answer, candidates[0])
+        case Verdict.UNSURE:
+            return _say_unsure(answer, candidates[0])
         case Verdict.FOUND | Verdict.LIKELY:
             return _say_found(candidates[0], recalled.doubt) + _say_others(answer.n_meant - 1)
 
@@ -137,19 +140,22 @@ def _say_others(n_others: int) -> str:
     return f" {n_others} {are} called so, of which fewer views agree."
 
 
-def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str:
-    first = candidates[0]
-    if answer.candidates[0].basis is Basis.NAME:
-        nearest = f"; {first.id} is the nearest by path" if first.check.path_m is not None else ""
-        return (
-            f"Ambiguous: {answer.n_meant} are called so{nearest}. Choose by room, or ask which is "
-            "meant, then take its id."
-        )
+def _say_several(answer: Answer, first: RecallCandidate) -> str:
+    is_named = answer.candidates[0].basis is Basis.NAME
+    are = "are called so" if is_named else "are such a thing"
+    nearest = f"; {first.id} is the nearest by path" if first.check.path_m is not None else ""
+    return (
+        f"Several: {answer.n_meant} {are}{nearest}. Choose by room, or ask which is meant, then "
+        "take its id."
+    )
+
+
+def _say_unsure(answer: Answer, first: RecallCandidate) -> str:
     kind = f" (it is more like {quote(answer.missing)})" if answer.missing else ""
     n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
     of_several = f", of {n_same} the nearest by path" if n_same > 1 else ""
     said = (
-        f"Ambiguous: nothing is called so{kind}. The likeliest is {_name(first)}{of_several}; what "
+        f"Unsure: nothing is called so{kind}. The likeliest is {_name(first)}{of_several}; what "
         "is meant may also not be remembered. See why each is listed, and take an id only if it "
         "fits; else say it in other words."
     )
