@@ -1,4 +1,4 @@
-"""Which maps were asked for, and what is written about each: looked at before anything is done."""
+"""The maps to show and the files to write about each, checked before anything is written."""
 
 import hashlib
 import os
@@ -39,7 +39,7 @@ class MapSelection:
 
     @property
     def pictures(self) -> tuple[Path, ...]:
-        """Those that are bare pictures, which do not say how large their pixels are."""
+        """The bare pictures, which do not say how large their pixels are."""
         return tuple(file for file in self.names if not is_description(file))
 
 
@@ -151,9 +151,9 @@ def _is_picture_of_a_map(file: Path) -> bool:
 
 
 def find_image(description: Path) -> Path | None:
-    """Return the picture that a map's .yaml names, or None for a .yaml that is no map's.
+    """Return the picture that a map's .yaml names, or None for another kind of .yaml.
 
-    One that cannot be read gives itself: what is wrong with it is told when it is shown.
+    For a file that cannot be read, return the file: its fault is reported when it is shown.
     """
     try:
         with description.open(encoding="utf-8", errors="replace") as file:
@@ -205,39 +205,43 @@ class MapJob:
 
     Attributes:
         file: The .yaml or the bare picture.
-        resolution_m: The side of a pixel, for a bare picture.
-        anchor: Where on Earth the map lies, if given.
-        start: Where ways are measured from, if they are wanted.
-        is_grey_unknown: Takes the grey of unknown for that, whatever the .yaml says.
     """
 
     file: Path
     name: str
+    outputs: Mapping[Output, Path]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapOptions:
+    """The options that are the same for all maps.
+
+    Attributes:
+        resolution_m: The side of a pixel, for bare pictures; a .yaml file says it itself.
+        anchor: Where on Earth the maps lie, if given.
+        start: Where paths are measured from, if they are wanted.
+        is_grey_unknown: Take the grey 205 for unknown, whatever the .yaml says.
+    """
+
     resolution_m: float | None
     anchor: MapAnchor | None
-    outputs: Mapping[Output, Path]
-    start: Point | None = None
-    is_grey_unknown: bool = False
+    start: Point | None
+    is_grey_unknown: bool
 
 
 def plan_jobs(
-    selection: MapSelection,
-    *,
-    resolution_m: float | None,
-    anchor: MapAnchor | None,
-    outputs: Mapping[Output, Path],
+    selection: MapSelection, options: MapOptions, outputs: Mapping[Output, Path]
 ) -> list[MapJob]:
-    """Return one job for each map, after looking whether all of them can be done.
+    """Return one job for each map, after checking that all of them can be done.
 
     Args:
-        resolution_m: The side of a pixel, for bare pictures; a .yaml file says it itself.
         outputs: What to write: files when there is one map, else folders.
 
     Raises:
         ConfigError: A resolution is missing, it or the anchor is of no use, or a result would
             overwrite a map or another result.
     """
-    _check_resolution(selection, resolution_m)
+    _check_resolution(selection, options.resolution_m)
     for output, target in outputs.items():
         if len(selection.names) > 1 and target.suffix and not target.is_dir():
             raise ConfigError(
@@ -245,7 +249,7 @@ def plan_jobs(
                 hint=f"Name a folder, such as {target.with_suffix('')}: each map gets its own file "
                 f"NAME{output} in it.",
             )
-    if anchor is not None and not outputs.keys() & {Output.GEOJSON, Output.OSM}:
+    if options.anchor is not None and not outputs.keys() & {Output.GEOJSON, Output.OSM}:
         raise ConfigError(
             "--anchor would change nothing: it is for --geojson and --osm.",
             hint="Say where one of them shall go, or leave --anchor out.",
@@ -254,8 +258,6 @@ def plan_jobs(
         MapJob(
             file=file,
             name=name,
-            resolution_m=resolution_m,
-            anchor=anchor,
             outputs={
                 output: target / f"{name}{output}" if _is_folder(target, selection) else target
                 for output, target in outputs.items()
@@ -307,7 +309,7 @@ def _is_folder(target: Path, selection: MapSelection) -> bool:
 
 
 def _check_targets(jobs: list[MapJob]) -> None:
-    """Look that no result overwrites a map or another result, before anything is written."""
+    """Check that no result overwrites a map or another result, before anything is written."""
     maps = {path.resolve() for job in jobs for path in _inputs(job.file)}
     written: set[Path] = set()
     for path in (path for job in jobs for path in job.outputs.values()):

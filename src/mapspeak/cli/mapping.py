@@ -4,14 +4,14 @@ import io
 import shutil
 import sys
 import warnings
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 from PIL import Image
 
-from mapspeak.cli.mapjobs import MapJob, Output, find_maps, is_description, plan_jobs
+from mapspeak.cli.mapjobs import MapJob, MapOptions, Output, find_maps, is_description, plan_jobs
 from mapspeak.cli.options import ANCHOR_OPTION, FILE, usual_modes
 from mapspeak.errors import ConfigError, MapError
 from mapspeak.geometry import Point
@@ -22,7 +22,7 @@ from mapspeak.server.text.maps import (
     say_size,
     say_unsure,
 )
-from mapspeak.spatial.areagraph import MapAnchor, build_area_graph
+from mapspeak.spatial.areagraph import build_area_graph
 from mapspeak.spatial.coverage import measure_known_area
 from mapspeak.spatial.mapfiles import LoadedMap, load_map, load_picture
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap, find_rooms
@@ -47,6 +47,7 @@ from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap, find_rooms
     "--from",
     "start",
     type=(float, float),
+    callback=lambda _context, _option, given: None if given is None else Point(*given),
     metavar="X Y",
     help="Tell the way from here to each region, for a robot 0.4 m wide.",
 )
@@ -56,57 +57,32 @@ from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap, find_rooms
     is_flag=True,
     help="Take grey 205 for unknown, whatever free_thresh says.",
 )
-def map_command(
-    files: tuple[Path, ...],
-    resolution_m: float | None,
-    anchor: MapAnchor | None,
-    start: tuple[float, float] | None,
-    picture: Path | None,
-    facts: Path | None,
-    labels: Path | None,
-    graph: Path | None,
-    geojson: Path | None,
-    osm: Path | None,
-    *,
-    is_grey_unknown: bool,
-) -> None:
+def map_command(files: tuple[Path, ...], **given: Any) -> None:  # noqa: ANN401 - click's options
     """Show map_server maps, or bare pictures, as a robot's map is shown; no robot is needed.
 
     FILES are .yaml files, pictures, folders of them, or quoted patterns such as
     "maps/**/map.yaml". With several maps, --out, --json, --rooms, --graph, --geojson and --osm
     name folders.
     """
-    wanted = {
-        Output.PICTURE: picture,
-        Output.FACTS: facts,
-        Output.LABELS: labels,
-        Output.GRAPH: graph,
-        Output.GEOJSON: geojson,
-        Output.OSM: osm,
-    }
-    jobs = plan_jobs(
-        find_maps(files),
-        resolution_m=resolution_m,
-        anchor=anchor,
-        outputs={output: path for output, path in wanted.items() if path is not None},
-    )
-    here = None if start is None else Point(*start)
-    jobs = [replace(job, start=here, is_grey_unknown=is_grey_unknown) for job in jobs]
+    paths = {output: given.pop(output.name.lower()) for output in Output}
+    outputs = {output: path for output, path in paths.items() if path is not None}
+    options = MapOptions(**given)
+    jobs = plan_jobs(find_maps(files), options, outputs)
     with usual_modes():
-        n_failed = _show_maps(jobs)
+        n_failed = _show_maps(jobs, options)
     if n_failed and len(jobs) > 1:
         click.echo(f"{n_failed} of {len(jobs)} maps could not be read.", err=True)
     sys.exit(1 if n_failed else 0)
 
 
-def _show_maps(jobs: list[MapJob]) -> int:
-    """Show one map after the other, and return how many could not be."""
+def _show_maps(jobs: list[MapJob], options: MapOptions) -> int:
+    """Show one map after the other, and return the number that could not be read."""
     n_failed = 0
     tell = _tell_watcher if len(jobs) > 1 and sys.stderr.isatty() else _tell_nobody
     for number, job in enumerate(jobs, start=1):
         tell(f"{number} of {len(jobs)}: {job.file}")
         try:
-            said, is_error = show_map(job), False
+            said, is_error = show_map(job, options), False
             if job.outputs:
                 said += f"\nWritten: {', '.join(map(str, job.outputs.values()))}"
         except MapError as error:
@@ -127,23 +103,25 @@ def _tell_nobody(_text: str) -> None:
     """Leave a log or a pipe as it is."""
 
 
-def show_map(job: MapJob) -> str:
+def show_map(job: MapJob, options: MapOptions) -> str:
     """Write what was asked for, and return a map's facts in a few lines.
 
     Raises:
         MapError: The map cannot be read, or cannot be written in the form asked for.
         ConfigError: A result cannot be written where it should go.
     """
-    loaded = _load(job)
+    loaded = _load(job, options)
     rooms = find_rooms(loaded.grid)
-    contents = {output: _content(output, job, loaded, rooms) for output in job.outputs}
+    contents = {output: _content(output, job, options, loaded, rooms) for output in job.outputs}
     for output, content in contents.items():
         _write(job.outputs[output], content)
-    return _summary(job, loaded, rooms)
+    return _summary(job, options.start, loaded, rooms)
 
 
-def _content(output: Output, job: MapJob, loaded: LoadedMap, rooms: RoomMap) -> bytes:
-    # Each form is imported where it is wanted: a map is to be told at once.
+def _content(
+    output: Output, job: MapJob, options: MapOptions, loaded: LoadedMap, rooms: RoomMap
+) -> bytes:
+    # Each form is imported when it is wanted, so that a map is described at once.
     match output:
         case Output.PICTURE:
             from mapspeak.server.mapview.drawing import draw_rooms  # noqa: PLC0415
@@ -165,11 +143,11 @@ def _content(output: Output, job: MapJob, loaded: LoadedMap, rooms: RoomMap) -> 
         case Output.GEOJSON:
             from mapspeak.spatial.areagraph.files import to_geojson  # noqa: PLC0415
 
-            text = to_geojson(graph, anchor=job.anchor)
+            text = to_geojson(graph, anchor=options.anchor)
         case Output.OSM:
             from mapspeak.spatial.areagraph.files import to_osm  # noqa: PLC0415
 
-            text = to_osm(graph, anchor=job.anchor)
+            text = to_osm(graph, anchor=options.anchor)
     return text.encode()
 
 
@@ -180,13 +158,13 @@ def _label_picture(rooms: RoomMap) -> bytes:
     return content.getvalue()
 
 
-def _load(job: MapJob) -> LoadedMap:
+def _load(job: MapJob, options: MapOptions) -> LoadedMap:
     with warnings.catch_warnings():
         # How large a map may be is said in an error of our own.
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        if is_description(job.file) or job.resolution_m is None:
-            return load_map(job.file, is_grey_unknown=job.is_grey_unknown)
-        return load_picture(job.file, resolution_m=job.resolution_m)
+        if is_description(job.file) or options.resolution_m is None:
+            return load_map(job.file, is_grey_unknown=options.is_grey_unknown)
+        return load_picture(job.file, resolution_m=options.resolution_m)
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -199,13 +177,13 @@ def _write(path: Path, content: bytes) -> None:
         ) from error
 
 
-def _summary(job: MapJob, loaded: LoadedMap, rooms: RoomMap) -> str:
+def _summary(job: MapJob, start: Point | None, loaded: LoadedMap, rooms: RoomMap) -> str:
     grid, known = loaded.grid, measure_known_area(loaded.grid)
     cells = f"{grid.n_cols} x {grid.n_rows} cells of {grid.resolution_m:g} m"
     size = f"{grid.width_m:.1f} x {grid.height_m:.1f} m"
     unknown = f"{100 * (1 - known.known_ratio):.0f} % unknown"
     by_size = sorted(rooms.regions, key=lambda region: region.floor_area_m2)
-    ways = _find_ways(job, loaded, by_size)
+    ways = _find_ways(start, loaded, by_size)
     return "\n".join(
         [
             f"{job.name}: {cells}, {size}, {known.free_area_m2:.1f} m2 free, {unknown}.",
@@ -233,14 +211,14 @@ def _say_sizes(rooms: RoomMap, by_size: list[Region]) -> list[str]:
     return [say_ranks(sure, is_of_all=True, has_unsure=bool(unsure)), *say_unsure(unsure)]
 
 
-def _find_ways(job: MapJob, loaded: LoadedMap, regions: list[Region]) -> dict[str, str]:
+def _find_ways(start: Point | None, loaded: LoadedMap, regions: list[Region]) -> dict[str, str]:
     """Return how far it is to each region, in words; nothing unless asked for."""
-    if job.start is None:
+    if start is None:
         return {}
     from mapspeak.ros.discovery.profile import USUAL_RADIUS_M  # noqa: PLC0415
     from mapspeak.spatial.paths.distances import distances_from  # noqa: PLC0415
 
-    field = distances_from(loaded.grid, job.start, radius_m=USUAL_RADIUS_M)
+    field = distances_from(loaded.grid, start, radius_m=USUAL_RADIUS_M)
     ways_m = {region.id: field.distance_to(region.widest) for region in regions}
     return {
         name: "  no way" if way_m is None else f"  way {way_m:.1f} m"

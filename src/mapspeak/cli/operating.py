@@ -1,4 +1,4 @@
-"""The operator's word, by commands and by keys: approve, stop, release, and replay of the log."""
+"""Commands and keys of the operator: approve, stop, release, and replay of the audit log."""
 
 import os
 import select
@@ -51,7 +51,7 @@ POLL_S = 0.01
 def stop(control: Path | None, reason: str, wait_s: float) -> None:
     """Stop every robot that is served from here, and hold it until `mapspeak release`.
 
-    Exit status: 1 if any robot has not answered, or there is none; the hold is set anyway.
+    Exit status: 1 if a robot has not answered, or none is served; the hold is set anyway.
     """
     hold = Hold(control_folder(control))
     stopped, unanswered = hold_robots(hold, reason=" ".join(reason.split()), wait_s=wait_s)
@@ -82,7 +82,7 @@ def release(control: Path | None) -> None:
 def hold_robots(
     hold: Hold, *, reason: str, wait_s: float
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Hold every robot of a folder; return those that stopped, and those that did not say so.
+    """Hold every robot of a folder; return the robots that stopped, and those that did not answer.
 
     Args:
         reason: For the log.
@@ -191,7 +191,7 @@ class StopKeys:
 def stop_keys(
     hold: "Hold", *, tell: Tell, terminal: int | None = None
 ) -> Generator[StopKeys | None]:
-    """Listen for keys in a terminal; return None, and do nothing, where there is none.
+    """Listen for keys in a terminal; without one, return None and do nothing.
 
     The terminal gives each key at once meanwhile, and is set back afterwards. Ctrl-C stays.
 

@@ -193,7 +193,7 @@ def build_guard(choice: GuardChoice, *, robot: str, address: str = "") -> "Guard
 
 @contextmanager
 def keep_private() -> Generator[None]:
-    """Let no other user read what is written meanwhile, but for what `usual_modes` is around."""
+    """Write files that no other user can read, except within `usual_modes`."""
     if data_folder().is_dir():
         with suppress(PermissionError):
             data_folder().chmod(0o700)
@@ -208,7 +208,7 @@ def keep_private() -> Generator[None]:
 
 @contextmanager
 def usual_modes() -> Generator[None]:
-    """Write a file that the person named with that person's own permissions."""
+    """Write files that the user named with the user's own permissions."""
     umask = _umask_of_person.get()
     if umask is None:
         yield

@@ -1,6 +1,6 @@
 """Agents: their assignment, how they end, and the client by which they call tools.
 
-A witness sees every call and its answer.
+A witness takes note of every call and its answer.
 """
 
 import base64
@@ -50,17 +50,17 @@ class ToolAnswer:
 
 
 class Witness:
-    """Hears the conversation, and may refuse a call; this one hears nothing and refuses nothing."""
+    """Is told of the conversation, and may refuse a call; this one refuses nothing."""
 
     def hear(self, turn: Turn, pictures: tuple[Picture, ...] = ()) -> None:
-        """Hear what is said, called (before the call is made) or answered (with its pictures).
+        """Take note of a text, a call (before it is made) or an answer (with its pictures).
 
         Raises:
             OutOfBudgetError: The call must not be made.
         """
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        """Hear a call before it is made.
+        """Take note of a call before it is made.
 
         Raises:
             OutOfBudgetError: It must not be made.
@@ -68,7 +68,7 @@ class Witness:
         self.hear(Turn(role="agent", call=ToolCall(tool=tool, arguments=arguments)))
 
     def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
-        """Hear what was answered."""
+        """Take note of an answer."""
         call = ToolCall(tool=tool, arguments={})
         turn = Turn(role="tool", text=answer.text, call=call, is_error=answer.is_error)
         self.hear(turn, answer.pictures)

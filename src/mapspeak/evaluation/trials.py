@@ -1,4 +1,4 @@
-"""Trials: what is attempted, how each is set, what was said, what came of it, and their files.
+"""Trials: their settings, conversations, results and files.
 
 A *task* is what is asked and how the answer is scored; a *trial* is one attempt at it by one agent
 in one world. On the disk each has a folder, whose result.json comes last.
@@ -312,13 +312,13 @@ def say_fault(error: Exception) -> str:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Put a file in its place whole, so that no reader and no crash ever sees half of it."""
+    """Write a file atomically: neither a reader nor a crash ever sees half of it."""
     new = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with new.open("wb") as file:
             file.write(data)
             file.flush()
-            # Else a machine that loses power may keep the name and lose what it stands for.
+            # Else a machine that loses power may keep the name and lose the content.
             os.fsync(file.fileno())
         new.replace(path)
     finally:

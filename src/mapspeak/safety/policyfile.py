@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from datetime import time
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 import cv2
 import numpy as np
@@ -172,15 +172,7 @@ class _WrittenArea(_Written):
 class _WrittenClosure(_WrittenArea):
     begins: Annotated[_TimeOfDay, Field(alias="from")] = "00:00"
     ends: Annotated[_TimeOfDay, Field(alias="until")] = "24:00"
-    days: Annotated[list[_Day], Field(min_length=1)] = [
-        "mon",
-        "tue",
-        "wed",
-        "thu",
-        "fri",
-        "sat",
-        "sun",
-    ]
+    days: Annotated[list[_Day], Field(min_length=1)] = [*get_args(_Day)]
 
     def hours(self) -> Hours:
         days = frozenset(DAYS.index(day) for day in self.days)
@@ -211,15 +203,8 @@ class _WrittenApproval(_Written):
     otherwise: Literal["refuse", "queue"] = "refuse"
 
     def approval(self) -> Approval:
-        asked = {
-            CommandKind.DRIVE: self.drives,
-            CommandKind.PUBLISH: self.publishes,
-            CommandKind.CALL: self.calls,
-            CommandKind.ACT: self.actions,
-            CommandKind.SET_PARAMETER: self.parameters,
-            CommandKind.SKILL: self.skills,
-        }
-        kinds = frozenset(kind for kind, is_asked in asked.items() if is_asked)
+        keys = {kind: key.removesuffix("_per_minute") for kind, key in RATE_KEYS.items()}
+        kinds = frozenset(kind for kind, key in keys.items() if getattr(self, key))
         return Approval(kinds=kinds, otherwise=Otherwise(self.otherwise))
 
 
@@ -230,9 +215,6 @@ class _WrittenRates(_Written):
     actions_per_minute: _PerMinute = USUAL_RATES[CommandKind.ACT]
     parameters_per_minute: _PerMinute = USUAL_RATES[CommandKind.SET_PARAMETER]
     skills_per_minute: _PerMinute = USUAL_RATES[CommandKind.SKILL]
-
-    def rates(self) -> dict[CommandKind, int]:
-        return {kind: getattr(self, key) for kind, key in RATE_KEYS.items()}
 
 
 class _PolicyFile(_Written):
@@ -264,15 +246,9 @@ class _PolicyFile(_Written):
                 *(area.rule() for area in self.keep_out),
                 *(area.rule(area.hours()) for area in self.closed),
             ),
-            patterns={
-                CommandKind.PUBLISH: self.publish.patterns(CommandKind.PUBLISH),
-                CommandKind.CALL: self.call.patterns(CommandKind.CALL),
-                CommandKind.ACT: self.act.patterns(CommandKind.ACT),
-                CommandKind.SET_PARAMETER: self.set_parameter.patterns(CommandKind.SET_PARAMETER),
-                CommandKind.SKILL: self.skill.patterns(CommandKind.SKILL),
-            },
+            patterns={kind: getattr(self, kind).patterns(kind) for kind in USUAL_DENIALS},
             approval=self.approval.approval(),
-            rates=self.rates.rates(),
+            rates={kind: getattr(self.rates, key) for kind, key in RATE_KEYS.items()},
         )
 
 

@@ -1,4 +1,4 @@
-"""HTML that no text in it can break, and pages that load nothing from elsewhere."""
+"""HTML with all text escaped, and pages that load nothing from elsewhere."""
 
 import base64
 import hashlib
@@ -16,7 +16,7 @@ INVISIBLE = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\ufff0-\uffff]"
     "|[\ud800-\udfff]"
 )
-"""Control characters, and those that change the text direction: they are spelled out."""
+"""Control characters, and characters that change the text direction: they are spelled out."""
 
 
 def text(value: object) -> Html:

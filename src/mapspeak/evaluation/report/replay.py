@@ -1,4 +1,4 @@
-"""The replay of a trial: its map and way, and every step with what was said and seen."""
+"""The replay of a trial: its map and path, and every step with its text and pictures."""
 
 import hashlib
 import json
@@ -141,7 +141,7 @@ def _steps(
 
 
 def _group(turns: Sequence[Turn]) -> list[list[Turn]]:
-    """Return what is shown at once: something said, or a call with its answer."""
+    """Return the turns of each step: one text, or a call with its answer."""
     groups: list[list[Turn]] = []
     for turn in turns:
         if turn.role == "tool" and groups and groups[-1][-1].role == "agent":

@@ -1,4 +1,4 @@
-"""One trial from its setting to its score, every turn and picture written down at once."""
+"""One trial from its setting to its score; every turn and picture is written at once."""
 
 import time
 from collections.abc import Callable
@@ -49,7 +49,7 @@ from mapspeak.spatial.mapfiles import load_map
 
 
 class Transcript(Witness):
-    """The witness of one trial, which holds it to its limits and writes all down.
+    """The witness of one trial, which enforces its limits and writes its conversation.
 
     Args:
         limits: What it may cost; wall time is watched from outside.
@@ -74,7 +74,7 @@ class Transcript(Witness):
         self._turns = (folder / TURNS).open("wb")
 
     def hear(self, turn: Turn, pictures: tuple[Picture, ...] = ()) -> None:
-        """Write a turn down, with where the robot then stood, and keep its pictures.
+        """Write a turn with the robot's pose at that time, and keep its pictures.
 
         Raises:
             OutOfBudgetError: The call would be one too many, or comes too late.

@@ -1,4 +1,4 @@
-"""The run as a log of inspect-ai, for `inspect view` and whatever reads such logs.
+"""The run as a log of inspect-ai, for `inspect view` and other readers of such logs.
 
 The format is that of inspect-ai's log files (version 2): a zip of JSON with a header, summaries and
 a file for each sample. A sample is a task in a world by one agent; its epochs are the trials.
@@ -157,7 +157,7 @@ def _images(turn: Turn, pictures: Path) -> Iterator[dict[str, Any]]:
 
 
 def _sample_id(trial: Trial) -> str:
-    """Return what is the same for all trials of a kind; it names a file, so without slashes."""
+    """Return the id shared by all trials of a kind, without slashes, because it names a file."""
     return trial.id.rpartition("/")[0].replace("/", " ")
 
 

@@ -79,7 +79,7 @@ class TrialJob:
 def make_jobs(
     options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]
 ) -> Iterator[TrialJob]:
-    """Yield what is to be done: first all that others wait for, the largest world first.
+    """Yield all jobs: first those that others wait for, the largest world first.
 
     Exploring takes longest, and longest in the largest world: begun last, it would keep one
     process busy while the others have nothing left to do.
@@ -222,7 +222,7 @@ def run_jobs(
 
 
 def _kill(running: Iterable[_Running]) -> None:
-    # All are told before one is waited for: a second Ctrl-C may end the waiting.
+    # All are killed before the first is waited for: a second Ctrl-C may end the waiting.
     for each in running:
         each.process.kill()
     for each in running:
@@ -328,7 +328,7 @@ def _write_broken(run: Path, job: TrialJob, state: TrialState, error: str) -> Tr
 
 
 def _work_apart(work: Callable[[], object], errors: Path) -> None:
-    """Do the work; what it says goes to a file, and it ends when the run does."""
+    """Do the work; its output goes to a file, and it ends when the run does."""
     # Loaded objects stay: the garbage collector need not visit them and copy their pages.
     gc.freeze()
     if (parent := multiprocessing.parent_process()) is not None:
@@ -350,7 +350,7 @@ def _work_apart(work: Callable[[], object], errors: Path) -> None:
         sys.stderr.write("\n".join(map(str, leaves)) if is_ours else traceback.format_exc())
     with suppress(OSError):
         sys.stderr.flush()
-    # Nothing here is worth an orderly end: threads may wait for what never comes.
+    # No orderly end is needed, and threads may wait for ever.
     os._exit(status)
 
 

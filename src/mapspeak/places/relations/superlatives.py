@@ -1,6 +1,6 @@
 """Things of a kind in an order: the nearest, the second-smallest, all of them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +84,8 @@ def find_several(world: WorldModel, words: Several, at: Referent | None) -> tupl
     if words.kind is None:
         return _find_called(world, words, at)
     if words.count is None:
-        found = [each for each in _list_all(world, words.kind) if _is_at(world, each, at)]
+        everything = _list(world, words.kind, SIZED_CLASSES)
+        found = [each for each in everything if _is_at(world, each, at)]
         if not found:
             raise refuse(_say_none(world, words.kind))
         return tuple(Place(each.id, each) for each in found)
@@ -150,7 +151,7 @@ def _sort_by_way(
     distances = world.distances if start is None else world.map.distances_from(start.anchor)
     own = None if start is None else (start.region or start.door)
     ranked = []
-    for each in _list_near(world, kind):
+    for each in _list(world, kind):
         far_m = _measure_way(world, each, distances)
         if each is not own and far_m is not None and np.isfinite(far_m):
             ranked.append(Ranked(far_m, each))
@@ -158,7 +159,10 @@ def _sort_by_way(
     return sorted(ranked, key=lambda each: sign * each.value)
 
 
-def _list_near(world: WorldModel, kind: Kind) -> Sequence[Sized | RememberedPlace]:
+def _list(
+    world: WorldModel, kind: Kind, classes: Mapping[Kind, tuple[RoomClass, ...]] = CLASSES
+) -> Sequence[Sized | RememberedPlace]:
+    """Return the things of a kind; regions by the classes that count as that kind."""
     match kind:
         case Kind.FRONTIER:
             return world.frontiers.frontiers
@@ -168,14 +172,7 @@ def _list_near(world: WorldModel, kind: Kind) -> Sequence[Sized | RememberedPlac
             return world.places
         case _:
             regions = world.rooms.regions
-            return tuple(each for each in regions if each.room_class in CLASSES[kind])
-
-
-def _list_all(world: WorldModel, kind: Kind) -> Sequence[Sized | RememberedPlace]:
-    if kind not in SIZED_CLASSES:
-        return _list_near(world, kind)
-    regions = world.rooms.regions
-    return tuple(each for each in regions if each.room_class in SIZED_CLASSES[kind])
+            return tuple(each for each in regions if each.room_class in classes[kind])
 
 
 def _measure_way(
@@ -207,7 +204,11 @@ def _sort_by_size(
     """
     if kind is Kind.REMEMBERED:
         raise refuse("A remembered place has no size.", ["nearest remembered place"])
-    found = [(_size_of(each), each) for each in _list_all(world, kind) if _is_sized(each)]
+    found = [
+        (_size_of(each), each)
+        for each in _list(world, kind, SIZED_CLASSES)
+        if not isinstance(each, RememberedPlace)
+    ]
     sure = [(size, each) for size, each in found if not _is_unsure(world, each)]
     unsure = tuple(each.id for _, each in found if _is_unsure(world, each)) if sure else ()
     sign = -1 if order is Order.LARGEST else 1
@@ -215,18 +216,10 @@ def _sort_by_size(
     return sorted(ranked, key=lambda each: sign * each.value), unsure
 
 
-def _is_sized(thing: Sized | RememberedPlace) -> bool:
-    return not isinstance(thing, RememberedPlace)
-
-
-def _size_of(thing: Sized | RememberedPlace) -> float:
+def _size_of(thing: Sized) -> float:
     match thing:
-        case Region(floor_area_m2=area_m2) | Frontier(gain_m2=area_m2):
-            return area_m2
-        case Door(width_m=width_m):
-            return width_m
-        case RememberedPlace():
-            return 0.0
+        case Region(floor_area_m2=size) | Frontier(gain_m2=size) | Door(width_m=size):
+            return size
 
 
 def _is_unsure(world: WorldModel, thing: Sized | RememberedPlace) -> bool:

@@ -7,7 +7,7 @@ is, over depth, the same mixture of them (Olano and Greer, "Triangle scan conver
 homogeneous coordinates", 1997).
 
 The depth buffer is filled tile by tile. Every triangle is paired with the tiles that it may touch.
-A triangle that covers a whole tile hides all that lies behind it there, so most of what is hidden
+A triangle that covers a whole tile hides everything behind it there, so most of what is hidden
 falls away before any pixel is looked at. What is left is compared pixel by pixel.
 """
 

@@ -49,7 +49,7 @@ def draw(surface: Surface) -> Picture:
 
 
 def _read_drawn(surface: Surface) -> Picture:
-    """Return what is drawn of a surface, shape (height, width, 3)."""
+    """Return the drawing of a surface, shape (height, width, 3)."""
     folder = resources.files("mapspeak.simulator.camera").joinpath("surfaces")
     with folder.joinpath(f"{surface}.png").open("rb") as file:
         return np.asarray(Image.open(file).convert("RGB"))
@@ -125,7 +125,7 @@ _GRAINS: Mapping[Surface, Callable[[], FloatArray]] = MappingProxyType(
         Surface.CRATE_SIDE: lambda: 12.0 * _grain(256, 256, rows=0.3, columns=0.03),
     }
 )
-"""What makes paper and wood rough, beside what is drawn on them."""
+"""Roughness of paper and wood, added to the drawings on them."""
 
 
 # --- packed ----------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """A world out of a map: walls from its occupied cells, no objects.
 
-So any building that has once been mapped can be driven in. What the map does not know is closed
+Any mapped building can be driven in this way. Unknown parts of the map are closed
 off by a wall: what would be seen there is not known.
 """
 
@@ -55,7 +55,7 @@ def find_floor(grid: OccupancyGrid) -> Mask:
         resolution_m=grid.resolution_m,
         origin=grid.origin,
     )
-    # A cell more than the radius, as what is measured here ends at the middles of cells.
+    # One cell more than the radius, because clearances end at the centres of cells.
     is_clear = closed.free & (clearance_m(closed) >= BODY_RADIUS_M + grid.resolution_m)
     n_labels, labels, statistics, _ = cv2.connectedComponentsWithStats(
         is_clear.view(np.uint8), connectivity=4

@@ -1,6 +1,6 @@
 """The world cut flat: the outlines of everything solid within a band of heights.
 
-What the LiDAR meets, what the robot bumps into and what is free floor all come from here.
+LiDAR hits, collisions and free floor are all computed from slices.
 """
 
 import math
@@ -60,7 +60,7 @@ class Slice:
         return float(np.sqrt(self._squared_gaps(point).min(initial=math.inf)))
 
     def near(self, point: Point, *, reach_m: float) -> "Slice":
-        """Return what is solid within reach of a point, each part whole."""
+        """Return the solid parts within reach of a point, each part whole."""
         if not self.outlines:
             return self
         sizes = [len(outline) for outline in self.outlines]
@@ -96,7 +96,7 @@ class Slice:
 
 
 def slice_world(world: World, *, low_m: float, high_m: float) -> Slice:
-    """Cut a world: return what is solid anywhere between two heights above the floor."""
+    """Return the parts of a world that are solid anywhere between two heights above the floor."""
     leaves = [door.leaf for door in world.doors if door.is_shut]
     upright = (*world.walls, *leaves)
     outlines = [_outline_wall(wall) for wall in upright if low_m < wall.height_m]

@@ -104,9 +104,9 @@ def read_world_text(name_or_path: str | Path) -> str:
 
 
 def write_as_changed(name_or_path: str | Path, world: World, path: Path) -> Path:
-    """Write a world file that says what is otherwise in a world made of it, and return its path.
+    """Write a world file with the changes of a world that was made from it; return its path.
 
-    More things, doors that are shut, the battery and the faults of skills may be.
+    Added things, shut doors, the battery and the faults of skills are written.
 
     Raises:
         ConfigError: The world is made from a map, which has no things.
@@ -197,7 +197,7 @@ class _WorldFile(_Written):
 
 
 class _FaultError(Exception):
-    """Something that no single field can see is wrong, at a place in the file."""
+    """A fault that concerns several fields, at a place in the file."""
 
     def __init__(self, location: _Location, message: str) -> None:
         super().__init__(message)

@@ -1,6 +1,6 @@
 """Labels that do not overlap: each beside its place, or joined to it by a thin line.
 
-Marks in nearly the same place share one label, so that it is plain what it belongs to.
+Marks in nearly the same place share one label, so that it is clear what it belongs to.
 """
 
 import math

@@ -69,7 +69,7 @@ class Legend:
     def limited_to(
         self, layers: MapLayers, regions: tuple[PictureRegion, ...], *, has_origin: bool
     ) -> "Legend":
-        """Return the legend with only the entries for what is to be seen, each with a colour."""
+        """Return the legend with only the entries for what is visible, each with a colour."""
         shown = {
             LegendSample.ZONE: bool(layers.zones),
             LegendSample.ROBOT: layers.robot is not None,

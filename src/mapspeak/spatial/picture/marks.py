@@ -110,7 +110,7 @@ def _grid_over_fill(colour: Colour) -> int:
 
 
 def _build_grid_over(first: int, *, fill_offset: int) -> NDArray[np.uint8]:
-    """Return what a grid line turns each palette number into; walls stay what they are."""
+    """Return the palette number of a grid line over each number; walls stay as they are."""
     over = np.arange(256, dtype=np.uint8)
     over[FREE], over[UNKNOWN_GROUND], over[GREYS[0]] = first, first + 1, first + 2
     over[GREYS[1:51]] = first
@@ -248,7 +248,7 @@ class Zone:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegendEntry:
-    """One symbol of a picture and what it stands for.
+    """One symbol of a picture and its meaning.
 
     Attributes:
         colour: Only for marks and lines of this colour; None for those of any.

@@ -1,4 +1,4 @@
-"""The search for a place for each label: near what it names, on nothing that should be seen.
+"""Label placement: near what a label names, on nothing that should stay visible.
 
 Every label tries positions around its place, from near to far, and takes the one that covers the
 fewest walls and drawn things; a label with no free position gets none.
@@ -170,7 +170,7 @@ def place_labels(
     obstacles: list[Box],
     regions: NDArray[np.uint16],
 ) -> tuple[list[Placed], tuple[str, ...]]:
-    """Return the labels with their places, and the names of those that found none.
+    """Return the placed labels, and the names of labels without room.
 
     Args:
         inside: The map area in palette numbers, with the lines but without the symbols.

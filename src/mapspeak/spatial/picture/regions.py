@@ -30,7 +30,7 @@ AUTOMATIC_COLOURS = (
 
 _LATTICE_M = 0.2
 _NEIGHBOUR_M = (0.2, 0.6, 1.2)
-"""Regions that far apart, as on both sides of a wall, look like neighbours."""
+"""Regions this far apart, as on both sides of a wall, look like neighbours."""
 _EDGE_PX = 2
 _REGION_HATCH_PX = 9
 _DOT_STEP_PX = 10
@@ -134,7 +134,7 @@ def _key(region: PictureRegion) -> int:
 
 
 def _find_neighbours(labels: NDArray[np.uint16], grid: OccupancyGrid) -> dict[int, set[int]]:
-    """Return, for each label, those that come near it along a row or a column of cells."""
+    """Return, for each label, the labels near it along a row or a column of cells."""
     step = max(1, round(_LATTICE_M / grid.resolution_m))
     # The lattice stays where it is in the world as a map grows.
     first_row, first_col = (
@@ -196,7 +196,7 @@ _HATCH_STEP_PX = 12
 _HATCH_PX = 2
 _SHIFT = 4
 _FAR_PX = 1 << 20
-"""OpenCV draws with whole numbers; what lies so far out of sight needs no exact place."""
+"""OpenCV draws with whole numbers; points farther out of the picture need no exact place."""
 
 
 def paint_zones(
