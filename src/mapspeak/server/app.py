@@ -89,20 +89,16 @@ class MapspeakServer(MCPServer[Any]):
         self.book = book
         self._session = session
         self._call_log = call_log
-        self._arguments: dict[str, frozenset[str]] = {}
-        self._numbers: dict[str, frozenset[str]] = {}
-        self._lists: dict[str, frozenset[str]] = {}
-        self._former: dict[str, Mapping[str, str]] = {}
-        self._remembering: set[str] = set()
+        self._offered: dict[str, Tool] = {}
         self._remarks = Remarks(session)
-        self.skills = SkillBoard(runs, others=lambda: self._arguments)
+        self.skills = SkillBoard(runs, others=lambda: self._offered)
         self.hearers = ListHearers(self)
         self.exposure: Exposure | None = None
 
     @property
     def n_tools(self) -> int:
         """The number of offered tools."""
-        return len(self._arguments)
+        return len(self._offered)
 
     def expose(self, ros: RosAccess, patterns: tuple[str, ...]) -> None:
         """Look for interfaces of the robot with some names, once `keep_skills` runs."""
@@ -119,16 +115,8 @@ class MapspeakServer(MCPServer[Any]):
         """Call a tool; a `MapspeakError` reaches the model with its hint."""
         if name == VIEW_MAP:
             return await super().call_tool(name, arguments, context)
-        former = self._former.get(name, {})
-        arguments = {
-            key if former.get(key, key) in arguments else former[key]: value
-            for key, value in arguments.items()
-        }
-        arguments |= {
-            key: _read_list(value)
-            for key in self._lists.get(name, frozenset()) & arguments.keys()
-            if isinstance(value := arguments[key], str)
-        }
+        if (tool := self._offered.get(name)) is not None:
+            arguments = _read_arguments(tool, arguments)
         if self._call_log is None:
             return await self._call_readably(name, arguments, context)
         with self._call_log.noting(name, arguments) as note:
@@ -145,7 +133,7 @@ class MapspeakServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         session_id = "" if context is None else client_of(context)
         caller = Caller(client=name_client(context), tool=name, session=session_id)
-        with self._session.client_is_heard(), calling(caller), offering(self._arguments):
+        with self._session.client_is_heard(), calling(caller), offering(self._offered):
             self._check_arguments(name, arguments)
             await self._remarks.meet(caller.client)
             try:
@@ -166,8 +154,8 @@ class MapspeakServer(MCPServer[Any]):
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Note in the audit log that a tool has changed the memory."""
-        guard = self._session.guard
-        if guard is not None and name in self._remembering:
+        guard, tool = self._session.guard, self._offered.get(name)
+        if guard is not None and tool is not None and tool.effect is ToolEffect.REMEMBERS:
             what = arguments.get("name") or arguments.get("text") or arguments.get("event") or name
             said = f"remembered {str(what)[:120]!r}"
             guard.note_event("memory", said, robot_s=self._session.robot.now_s)
@@ -204,12 +192,7 @@ class MapspeakServer(MCPServer[Any]):
 
     def offer(self, tool: Tool) -> None:
         """Add a tool to those that can be called."""
-        self._arguments[tool.name] = tool.arguments
-        self._numbers[tool.name] = tool.numbers
-        self._lists[tool.name] = tool.lists
-        self._former[tool.name] = tool.former
-        if tool.effect is ToolEffect.REMEMBERS:
-            self._remembering.add(tool.name)
+        self._offered[tool.name] = tool
         self.add_tool(
             tool.function,
             title=tool.title,
@@ -246,12 +229,14 @@ class MapspeakServer(MCPServer[Any]):
                 f"{name} was called with {n_bytes / 1e6:.1f} MB of arguments; at most "
                 f"{MOST_BYTES / 1e6:g} MB are taken. Nothing was done; send less."
             )
-        strangers = sorted(set(given) - self._arguments.get(name, frozenset(given)))
-        if strangers:
-            known = ", ".join(sorted(self._arguments[name])) or "none"
+        tool = self._offered.get(name)
+        if tool is None:
+            return
+        if strangers := sorted(set(given) - tool.arguments):
+            known = ", ".join(sorted(tool.arguments)) or "none"
             raise ToolError(f"{name} has no argument {', '.join(strangers)}; it has: {known}.")
         flags = {key for key, value in given.items() if isinstance(value, bool)}
-        if wrong := sorted(flags & self._numbers.get(name, frozenset())):
+        if wrong := sorted(flags & tool.numbers):
             raise ToolError(f"{name} wants a number for {', '.join(wrong)}, not true or false.")
 
     async def note_hang_up(self, client: str) -> None:
@@ -279,6 +264,18 @@ class MapspeakServer(MCPServer[Any]):
             if tool.name != VIEW_MAP
         ]
         return [*lean, *self.skills.listed]
+
+
+def _read_arguments(tool: Tool, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments under the tool's own names, lists that came as text as lists."""
+    former = tool.former
+    named = {
+        key if former.get(key, key) in given else former[key]: value for key, value in given.items()
+    }
+    return {
+        key: _read_list(value) if key in tool.lists and isinstance(value, str) else value
+        for key, value in named.items()
+    }
 
 
 def _read_list(text: str) -> list[Any]:

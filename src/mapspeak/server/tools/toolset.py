@@ -4,6 +4,7 @@ import inspect
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from mcp_types import ToolAnnotations
@@ -23,7 +24,7 @@ class ToolEffect(StrEnum):
     MOVES = "moves"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Tool:
     """One tool of the MCP surface.
 
@@ -50,12 +51,12 @@ class Tool:
         """Its name for clients."""
         return self.function.__name__
 
-    @property
+    @cached_property
     def arguments(self) -> frozenset[str]:
         """The names of its arguments."""
         return frozenset(inspect.signature(self.function).parameters) - {"context"}
 
-    @property
+    @cached_property
     def numbers(self) -> frozenset[str]:
         """The names of the arguments that are numbers."""
         hints = get_type_hints(self.function)
@@ -63,7 +64,7 @@ class Tool:
             name for name in self.arguments if float in (hints[name], *get_args(hints[name]))
         )
 
-    @property
+    @cached_property
     def lists(self) -> frozenset[str]:
         """The names of the arguments that are lists."""
         hints = get_type_hints(self.function)
