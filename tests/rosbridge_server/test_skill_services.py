@@ -15,6 +15,7 @@ from mapspeak.links.simulated import SimulatedRobot
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.simulator import Simulation, StateRecord
+from mapspeak.skills.skillsfile import load_skills
 from rosserved import QUICK
 from skilledworld import make_workshop
 
@@ -107,3 +108,34 @@ async def test_services_of_custom_types_are_typed_tools_where_rosapi_tells_them(
     assert "text cannot be 7" in refused
     assert "No dock answers within 2.5 m." in failed
     assert StateRecord.of(simulation).deeds == ("speak: Hello",)
+
+
+SPEAK = """skills:
+- name: say
+  service: /robot_skills/speak
+  definition: |
+    string text
+    ---
+    bool success
+    string message
+  arguments:
+  - {name: words, sets: text, kind: text, most: 200}
+"""
+
+
+@both
+async def test_an_owner_describes_a_type_that_the_robot_does_not(
+    dialect: Dialect, tmp_path: Path
+) -> None:
+    path = tmp_path / "skills.yaml"
+    path.write_text(SPEAK)
+    async with (
+        workshop(dialect, tmp_path) as (simulation, url),
+        open_client(RobotAddress(url=url), patience=QUICK) as client,
+        watched(
+            FakeRobot(two_rooms()), client, tmp_path, expose=(), skills=load_skills(path)
+        ) as caller,
+    ):
+        for words in ("Hello", "Once more"):
+            assert "succeeded" in await caller.ask("say", words=words)
+    assert StateRecord.of(simulation).deeds == ("speak: Hello", "speak: Once more")

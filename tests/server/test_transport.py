@@ -189,6 +189,34 @@ async def test_only_the_end_of_a_known_session_stops_its_drive(
         assert robot.n_stops == n_stops
 
 
+async def call_tool(address: str, session: str, tool: str, **arguments: object) -> str:
+    body = {"jsonrpc": "2.0", "id": 7, "method": "tools/call"}
+    body |= {"params": {"name": tool, "arguments": arguments}}
+    return await request(address, "POST", JSON | {"Mcp-Session-Id": session}, json.dumps(body))
+
+
+async def test_only_the_client_of_a_mission_answers_its_question_until_it_hangs_up(
+    tmp_path: Path,
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    session = Session(FakeRobot(two_rooms()), SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
+    server = build_server(session, toolsets=("missions",))
+    with anyio.fail_after(60.0):
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(server.keep_skills)
+            tasks.start_soon(serve_http, server, address)
+            one, other = await begin_session(address), await begin_session(address)
+            asked = await call_tool(address, one, "run_mission", tree="- ask: Ready?\n")
+            refused = await call_tool(address, other, "answer_mission", answer="yes")
+            await request(address, "DELETE", {"Mcp-Session-Id": one})
+            answered = await call_tool(address, other, "answer_mission", answer="yes")
+            tasks.cancel_scope.cancel()
+    assert "Ready?" in asked
+    assert "Only the client that runs the mission answers it." in refused
+    assert "Q1 is answered: yes." in answered
+
+
 async def test_a_client_that_leaves_in_mid_request_costs_one_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:

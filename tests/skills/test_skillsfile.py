@@ -1,5 +1,6 @@
 """skills.yaml: an owner's words become skills, and mistakes are named with their line."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -110,6 +111,14 @@ def test_what_ships_loads_and_wants_a_persons_word_for_the_pose(name: str) -> No
     entries = {each.spec.name: each for each in load_skills(Path(name))}
     assert entries["set_initial_pose"].spec.is_always_asked
     assert all(each.spec.description for each in entries.values())
+
+
+HOWTO = Path(__file__).parents[2] / "docs" / "howto" / "skills.md"
+
+
+@pytest.mark.parametrize("written", re.findall(r"```yaml\n(.*?)```", HOWTO.read_text(), re.DOTALL))
+def test_what_the_howto_shows_is_right(tmp_path: Path, written: str) -> None:
+    assert load(tmp_path, written)
 
 
 @pytest.mark.anyio

@@ -18,7 +18,7 @@ MOST_BYTES = 5_000_000
 MOST_TOLD = 5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True)
 class Interrupted:
     """A mission that a server began and did not live to end.
 
@@ -29,7 +29,7 @@ class Interrupted:
 
     name: str
     begun: str
-    steps: tuple[str, ...]
+    steps: tuple[str, ...] = ()
 
 
 class MissionRecord:
@@ -60,42 +60,32 @@ class MissionRecord:
 
     def take_interrupted(self) -> tuple[Interrupted, ...]:
         """Return the missions that no server will end any more, once: they are noted as ended."""
-        names: dict[str, tuple[str, str]] = {}
-        steps: dict[str, list[str]] = {}
+        found: dict[str, Interrupted] = {}
         for line in self._read():
-            run, event = str(line.get("run")), line.get("event")
+            run, event, said = str(line.get("run")), line.get("event"), str(line.get("said"))
             if event == "begun" and not _is_alive(line.get("process")):
-                names[run] = (str(line.get("said")), str(line.get("at")))
-            elif event == "step":
-                steps.setdefault(run, []).append(str(line.get("said")))
+                found[run] = Interrupted(said, str(line.get("at")))
+            elif event == "step" and run in found:
+                found[run].steps += (said,)
             elif event == "ended":
-                names.pop(run, None)
-        if names:
+                found.pop(run, None)
+        if found:
             # The last line of a server that was killed may be half a line.
             with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
                 file.write("\n")
-        for run in names:
+        for run in found:
             self._run = run
-            self._write("ended", "interrupted: its server ended")
-        found = [
-            Interrupted(name=name, begun=begun, steps=tuple(steps.get(run, ())))
-            for run, (name, begun) in names.items()
-        ]
-        return tuple(found[-MOST_TOLD:])
+            self.end("interrupted: its server ended")
+        return tuple(found.values())[-MOST_TOLD:]
 
     def _read(self) -> Iterator[dict[str, Any]]:
-        try:
+        lines: list[str] = []
+        with suppress(OSError):
             lines = self._path.read_text(encoding="utf-8").splitlines()
-        except OSError:
-            return
         for line in lines:
-            try:
-                read = json.loads(line)
-            except ValueError:
-                # The last line of a server that was killed.
-                continue
-            if isinstance(read, dict):
-                yield read
+            with suppress(ValueError):
+                if isinstance(read := json.loads(line), dict):
+                    yield read
 
     def _write(self, event: str, said: str) -> None:
         """Append a line; that it cannot be is told, and ends no mission."""
@@ -123,7 +113,7 @@ def _is_alive(process: object) -> bool:
         return False
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, OverflowError):
         return False
     except PermissionError:
         return True

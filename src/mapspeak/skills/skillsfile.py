@@ -137,6 +137,7 @@ class OwnersEntry(_Written):
 
     Attributes:
         type: Given by the owner, where the robot does not tell it.
+        definition: Of the type, likewise; as `ros2 interface show` prints it.
         fixed: Arguments of what it calls that are always the same.
         succeeded_when: Conditions on the result; None where the robot's own report decides.
         remember: Remarks of people about it since.
@@ -151,6 +152,7 @@ class OwnersEntry(_Written):
     robot_skill: _Target | None = None
     mission: Any = None
     type: _Target | None = None
+    definition: Annotated[str, Field(max_length=20_000)] | None = None
     fixed: dict[str, Any] = {}
     arguments: Annotated[list[_Argument], Field(max_length=40)] = []
     succeeded_when: _Success | None = None

@@ -85,7 +85,9 @@ class SkillBook:
         """
         found = self.skills.get(name)
         if found is None:
-            raise SkillError(f"There is no skill {name[:60]!r}.", hint="The list of skills tells.")
+            raise SkillError(
+                f"There is no skill {name[:60]!r}.", hint=f"There are: {', '.join(self.skills)}."
+            )
         return found
 
     def put_up(self, board: SkillBoard) -> None:
@@ -163,6 +165,8 @@ class SkillBook:
             Called.ACTION: inquiry.fetch_action_type,
         }.get(entry.calls, inquiry.fetch_topic_type)
         type_name = entry.type or await fetch(name)
+        if entry.definition and not await inquiry.connection.fetch_definitions(type_name):
+            await inquiry.teach(type_name, entry.definition)
         interface = Interface(InterfaceKind(entry.calls), name, type_name)
         return await open_interface(interface, self._ros, name=entry.name)
 
