@@ -212,6 +212,9 @@ DENIED: dict[CommandKind, tuple[str, ...]] = {
         "/keepout_filter/toggle_filter",
         "/collision_monitor/toggle",
         "/gazebo/set_model_state",
+        "/rosout_kill",
+        "/killall",
+        "/robot_skills/dock",
     ),
     CommandKind.PUBLISH: (
         "/odometry/filtered",
@@ -300,6 +303,10 @@ def test_a_type_is_denied_whatever_its_name(kind: CommandKind, type_name: str) -
     refused = refusal_of(named(kind, "/patrol", type_name), Policy())
     assert refused is not None
     assert refused.rule == f"{kind}.usual_denials"
+
+
+def test_a_skill_is_not_taken_for_what_kills() -> None:
+    assert refusal_of(named(CommandKind.CALL, "/robot_skills/speak"), Policy()) is None
 
 
 @pytest.mark.parametrize(

@@ -21,12 +21,13 @@ USUAL_DENIALS = {
     ),
     CommandKind.CALL: (
         *("*set_param*", "*delete_param*", "*shutdown*", "*change_state*", "*manage_nodes*"),
-        *("*load_node", "*unload_node", "*kill*", "*/_action/*", "*set_logger_*"),
+        *("*load_node", "*unload_node", "*[!s]kill*", "*/_action/*", "*set_logger_*"),
         # Where the robot is, and on which map.
         *("*set_pose*", "*initial_pose*", "*global_localization*", "*set_datum", "*/datum"),
         *("*load_map*", "*set_map*", "*deserialize*", "*load_database*"),
         *("*toggle_filter*", "*keepout*", "*collision_monitor*"),
-        # In a simulator these move the robot itself.
+        # These drive the robot past the planner, the latter in a simulator.
+        "*dock*",
         *("*set_model_*", "*set_entity_*", "*set_link_*", "*apply_*wrench*", "*apply_*effort*"),
         # These end or hang the rosapi of ROS 2, and with it all questions to the robot.
         *("*/message_details", "*/service_re*_details", "*/get_param_names"),
