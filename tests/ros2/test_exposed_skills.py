@@ -72,7 +72,7 @@ async def test_services_topics_and_actions_of_nodes_are_typed_tools(
             pose_pose_orientation_w=1.0,
             wait_s=20,
         )
-    assert fields["switch_motors"] == {"data": {"type": "boolean"}}
+    assert fields["switch_motors"]["data"]["type"] == "boolean"
     assert fields["publish_cmd_vel"]["linear_x"] == {"type": "number", "description": "m/s"}
     assert fields["spin"]["time_allowance_sec"]["description"] == "s"
     assert fields["navigate_to_pose"]["pose_pose_position_x"]["description"] == "m"

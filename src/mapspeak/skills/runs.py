@@ -111,9 +111,9 @@ class SkillRun:
                 if on_news is not None and self.n_progress != n_before:
                     await on_news(self)
 
-    async def cancel(self, why: SkillCode = SkillCode.CANCELLED) -> None:
+    async def cancel(self) -> None:
         """End it, and return when it has ended: nothing of it is left at the robot then."""
-        self.give_up(why)
+        self.give_up(SkillCode.CANCELLED)
         while not self.is_over:
             await self._news.wait()
 
