@@ -101,6 +101,23 @@ def test_what_one_store_writes_another_reads(store: MemoryStore, open_store: Ope
     assert names(store) == ["dock", "hall"]
 
 
+def test_what_measured_a_direction_and_a_range_is_kept(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    seen = Landmark(
+        label="sink", bearing_rad=0.5, range_m=2.0, bearing_from="picture", range_from="detector"
+    )
+    judged = Landmark(label="tap", bearing_rad=-0.5)
+
+    store.write(replace(place("dock"), functional_landmarks=(seen, judged)))
+
+    kept = open_store("b1").read().waypoints[0].functional_landmarks
+    assert [(each.bearing_from, each.range_from) for each in kept] == [
+        ("picture", "detector"),
+        (None, None),
+    ]
+
+
 def test_what_is_remembered_of_a_place_joins_what_was(store: MemoryStore) -> None:
     store.remember(place("dock", 1.0, HOSE))
 

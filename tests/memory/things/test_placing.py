@@ -1,6 +1,10 @@
 """How far one view alone says where a thing is."""
 
+import math
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
@@ -84,3 +88,31 @@ def test_a_range_that_fits_nothing_in_sight_leaves_the_direction_its_say() -> No
     chair = seen_down_the_corridor(30.0)
     assert chair.position is not None
     assert chair.position.x > 2.0
+
+
+BEARINGS = st.floats(-math.pi, math.pi)
+SPOTS = st.tuples(st.floats(0.6, 11.5), st.floats(0.6, 1.6))
+
+
+@given(first=SPOTS, second=SPOTS, one=BEARINGS, other=BEARINGS)
+def test_a_second_view_of_a_thing_never_enlarges_its_radius(
+    first: tuple[float, float], second: tuple[float, float], one: float, other: float
+) -> None:
+    grid = grid_from_text(WITH_A_TABLE, resolution_m=0.25)
+    places = [
+        Waypoint(
+            name=name,
+            pose=Pose(*spot, 0.0),
+            functional_landmarks=(
+                Landmark(label="chair", bearing_rad=bearing, bearing_from="picture"),
+            ),
+        )
+        for name, spot, bearing in (("a", first, one), ("b", second, other))
+    ]
+    (alone,) = find_things(SemanticMap(waypoints=(places[0],)), grid).things
+    both = find_things(SemanticMap(waypoints=tuple(places)), grid).things
+
+    (now,) = (thing for thing in both if "a" in thing.waypoints)
+    assert now.uncertainty_m is not None
+    assert alone.uncertainty_m is not None
+    assert now.uncertainty_m <= alone.uncertainty_m + 1e-9

@@ -396,7 +396,7 @@ def seen_by_the_robot(*detections: tuple[str, float, float | None]) -> FakeRobot
     return robot
 
 
-async def test_the_range_that_the_robot_measured_along_the_line_is_kept_with_its_source(
+async def test_what_the_robot_measured_along_the_line_is_kept_with_its_source(
     tmp_path: Path,
 ) -> None:
     robot = seen_by_the_robot(("sink", 12.0, 1.8), ("sink", -30.0, 0.9), ("ladder", 21.0, 0.7))
@@ -406,7 +406,8 @@ async def test_the_range_that_the_robot_measured_along_the_line_is_kept_with_its
     (sink,) = stored(tmp_path).landmarks
     assert sink.range_m == pytest.approx(1.8)
     assert sink.range_from == "fake detector"
-    assert degrees(sink.bearing_rad) == pytest.approx(20.0)
+    assert degrees(sink.bearing_rad) == pytest.approx(12.0)
+    assert sink.bearing_from == "fake detector"
     assert '1.8 m by the "fake detector"' in str(answer)
 
 

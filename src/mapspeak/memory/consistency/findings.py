@@ -52,7 +52,7 @@ place that are never named together, both are right one time in fifty; the loss 
 on how well the other is seen."""
 
 
-SEEN_ODDS = 21.0
+SEEN_ODDS = 24.0
 """Highest odds that a thing is still where it was last seen, once a later look missed it."""
 MISSED_RATIO = 0.2
 """Observers miss about one thing in five of those that a look shows."""

@@ -185,15 +185,23 @@ class Annotator:
         # The waypoint's picture also holds for the landmark.
         other = None if own == picture else own
         bearing_rad = _bearing_rad(thing, own)
+        bearing_from = None if thing.image_column_px is None else READ_OFF
         stood = pose if own is None else own.pose
-        range_m, range_from = _range_of(thing, bearing_rad, stood, own or picture)
+        range_m, range_from = thing.range_m, None
+        measured = _find_measured(thing, bearing_rad, stood, own or picture)
+        if measured is not None:
+            point, range_from = measured
+            range_m = stood.point.distance_to(point)
+            if bearing_from is None:
+                bearing_rad = wrap_angle(stood.point.bearing_to(point) - stood.yaw_rad)
+                bearing_from = range_from
         landmark = Landmark(
             label=thing.label,
             purpose=self._told(thing, "purpose"),
             bearing_rad=bearing_rad,
             range_m=range_m,
             range_from=range_from,
-            bearing_from=None if thing.image_column_px is None else READ_OFF,
+            bearing_from=bearing_from,
             confidence=thing.confidence,
             note=self._told(thing, "note"),
             picture=None if other is None else other.name,
@@ -261,12 +269,12 @@ def _find_fan(stood: Pose, bearing_rad: float, picture: TakenPicture | None) -> 
     return picture.laser.find_fan(stood, bearing_rad)
 
 
-def _range_of(
+def _find_measured(
     thing: LandmarkInput, bearing_rad: float | None, stood: Pose, picture: TakenPicture | None
-) -> tuple[float | None, str | None]:
-    """Return how far a landmark is, and what measured that where nobody judged it.
+) -> tuple[Point, str] | None:
+    """Return where the robot measured a landmark, and by what; None where it did not.
 
-    What the robot measured along the line to it, of something called so, is taken over.
+    It is what was measured along the line to it, of something called so.
 
     Args:
         thing: What was said of it.
@@ -274,19 +282,20 @@ def _range_of(
         stood: The pose it was seen from.
         picture: The one it was seen in.
     """
-    reading = None
-    if picture is not None and bearing_rad is not None:
-        reading = _find_reading(thing.label, stood.yaw_rad + bearing_rad, picture)
-    if picture is None or reading is None:
-        return thing.range_m, None
+    if picture is None or bearing_rad is None:
+        return None
+    reading = _find_reading(thing.label, stood.yaw_rad + bearing_rad, picture)
+    if reading is None:
+        return None
     ahead = Point(
         reading.range_m * math.cos(reading.bearing_rad),
         reading.range_m * math.sin(reading.bearing_rad),
     )
-    measured_m = stood.point.distance_to(picture.pose.transform(ahead))
+    point = picture.pose.transform(ahead)
+    measured_m = stood.point.distance_to(point)
     if thing.range_m is not None and abs(thing.range_m - measured_m) > SAME_RANGE_M:
-        return thing.range_m, None
-    return measured_m, reading.source
+        return None
+    return point, reading.source
 
 
 def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> PictureReading | None:
