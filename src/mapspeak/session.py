@@ -115,7 +115,7 @@ class Session:
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
         self._rank: VectorRank | None = None
         self._ranking = threading.Lock()
-        self.recollector = Recollector(find_model, kept=folder / "vectors.npz")
+        self.recollector = Recollector(find_model, kept=folder)
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
         self.world: WorldModel | None = None
@@ -256,6 +256,7 @@ class Session:
             world = await self.fetch_world_model()
             # All of it in the thread: what is remembered is joined with the map there.
             await in_thread(partial(_prepare, world))
+            await in_thread(self.recollector.keep_things)
             if self.recollector.embedder is not None:
                 await in_thread(partial(self.find_episodes, ANY_EPISODE))
 

@@ -5,6 +5,7 @@ import pty
 import re
 import shlex
 import socket
+import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -240,3 +241,12 @@ async def test_a_person_who_types_it_is_told_that_it_waits_for_a_client(tmp_path
         os.close(terminal)
     assert said.startswith("mapspeak: sim:office for an MCP client on standard input")
     assert "serve --http` serves it at an address" in said
+
+
+def test_the_end_does_not_wait_for_what_is_computed_ahead_of_questions() -> None:
+    computing = "threading.Thread(target=threading.Event().wait).start()"
+    code = f"import threading; from mapspeak.cli.serving import end_at_once; {computing}"
+    ended = subprocess.run(  # noqa: S603 - our own interpreter
+        [sys.executable, "-c", f"{code}; end_at_once()"], timeout=PATIENCE_S, check=False
+    )
+    assert ended.returncode == 0

@@ -17,6 +17,7 @@ from mapspeak.memory import Landmark, MemoryStore, SemanticMapStore, Waypoint
 from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.frames import Frames, MapFrame
 from mapspeak.memory.postgres import PostgresStore
+from mapspeak.memory.store.forgetting import forget_place, rename_place, restore
 from mapspeak.spatial import OccupancyGrid
 from postgres_server import PostgresServer, run_postgres
 
@@ -140,6 +141,40 @@ def test_what_is_gone_is_remembered_no_more(store: MemoryStore) -> None:
     again, merge = store.remember(place("dock", 1.0, HOSE))
     assert [each.label for each in merge.new] == ["hose"]
     assert not any(each.is_gone for each in again.waypoint.landmarks)
+
+
+def test_a_renamed_place_keeps_its_order_and_leaves_nothing_under_its_old_name(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    for name in ("dock", "hall", "gate"):
+        store.remember(place(name, 1.0, HOSE))
+    other = open_store("b1")
+    assert names(other) == ["dock", "hall", "gate"]
+
+    rename_place(store, "Hall", to="great hall")
+
+    assert names(store) == names(other) == ["dock", "great hall", "gate"]
+    assert not restore(store, "hall").places
+    assert names(other) == ["dock", "great hall", "gate"]
+    rename_place(other, "great hall", to="Great Hall")
+    assert names(store) == ["dock", "Great Hall", "gate"]
+
+
+def test_a_place_takes_the_name_of_a_forgotten_one_but_of_no_other(
+    store: MemoryStore, open_store: OpenStore
+) -> None:
+    for name in ("dock", "hall", "gate"):
+        store.remember(place(name))
+    forget_place(store, "gate")
+
+    with pytest.raises(SemanticMapError):
+        rename_place(store, "dock", to="hall")
+    with pytest.raises(SemanticMapError):
+        rename_place(store, "cellar", to="attic")
+    rename_place(store, "dock", to="gate")
+
+    assert names(open_store("b1")) == ["gate", "hall"]
+    assert not any(each.is_gone for each in store.read().waypoints)
 
 
 def test_what_many_remember_of_one_place_at_once_is_all_there(open_store: OpenStore) -> None:

@@ -1,11 +1,13 @@
 """`mapspeak serve`: a robot for MCP clients."""
 
 import gc
+import logging
 import math
 import os
 import shutil
 import signal
 import sys
+import threading
 from collections.abc import Callable, Collection, Coroutine, Generator, Mapping, Sequence
 from contextlib import AsyncExitStack, contextmanager
 from dataclasses import dataclass
@@ -186,6 +188,17 @@ def serve(robots: tuple[str, ...], **given: Any) -> None:  # noqa: ANN401 - clic
         policies=given.pop("policies"),
     )
     anyio.run(_serve, ServeOptions(robots=starts, **given))
+    end_at_once()
+
+
+def end_at_once() -> None:
+    """End the process if threads still compute ahead of questions that will not be asked."""
+    own = (threading.current_thread(), threading.main_thread())
+    if any(not each.daemon for each in threading.enumerate() if each not in own):
+        logging.shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
 
 
 async def _serve(options: ServeOptions) -> None:

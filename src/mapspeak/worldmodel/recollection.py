@@ -24,9 +24,13 @@ from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.thing import Category, Thing
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms.identity import match_best_first
+from mapspeak.worldmodel.keptthings import keep_things, load_things
 
 logger = logging.getLogger(__name__)
 
+KEPT_FROM = 1000
+"""Things are kept once so many views were joined anew; fewer are joined in a moment."""
+THINGS_FILE = "things.cache"
 SAME_THING_M = 1.0
 """A thing of the same name within this distance of an earlier one is that one, seen better."""
 MOST_CALLED = 1000
@@ -189,8 +193,8 @@ class Recollector:
 
     Args:
         find_model: Finds what compares meanings, once; None compares words.
-        kept: A file for the vectors of texts, so that a later session need not compute them again;
-            None keeps none. One that cannot be written costs only that.
+        kept: A folder for the vectors of texts and the things, so that a later session need not
+            compute them again; None keeps none. One that cannot be written costs only that.
     """
 
     def __init__(
@@ -202,6 +206,7 @@ class Recollector:
         # Held while the model is loaded, by the first question or ahead of it.
         self._loading = threading.RLock()
         self._latest: Recollection | None = None
+        self._n_joined = 0
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
         """Return what is remembered on a map; things keep their ids."""
@@ -241,7 +246,11 @@ class Recollector:
 
     @cached_property
     def _vectors(self) -> TextVectors | None:
-        return None if self._embedder is None else TextVectors(self._embedder, kept=self._kept)
+        return (
+            None
+            if self._embedder is None
+            else TextVectors(self._embedder, kept=self._kept and self._kept / "vectors.npz")
+        )
 
     def _find_vectors(self) -> TextVectors | None:
         with self._loading:
@@ -253,10 +262,25 @@ class Recollector:
         if vectors is not None:
             vectors.keep()
 
+    def keep_things(self) -> None:
+        """Write the things if most of the work to find them would be done again."""
+        with self._lock:
+            latest, n_joined = self._latest, self._n_joined
+        if self._kept is not None and latest is not None and n_joined >= KEPT_FROM:
+            keep_things(self._kept / THINGS_FILE, latest.found)
+            self._n_joined -= n_joined
+
+    def _load_things(self, memory: SemanticMap) -> Things | None:
+        is_large = sum(len(place.landmarks) for place in memory.waypoints) >= KEPT_FROM
+        return load_things(self._kept / THINGS_FILE) if self._kept and is_large else None
+
     def _make(
         self, memory: SemanticMap, grid: OccupancyGrid, earlier: Recollection | None
     ) -> Recollection:
-        found = find_things(memory, grid, earlier=None if earlier is None else earlier.found)
+        known = earlier.found if earlier else self._load_things(memory)
+        found = find_things(memory, grid, earlier=known)
+        joined = found.pools.keys() - known.pools.keys() if known else found.pools.keys()
+        self._n_joined += sum(map(len, joined))
         things, n_named = number_things(
             found.things,
             () if earlier is None else earlier.things,

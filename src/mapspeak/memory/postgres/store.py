@@ -47,6 +47,16 @@ _UPSERT = """
         changed = excluded.changed,
         position = CASE WHEN known.said IS NULL THEN excluded.position ELSE known.position END
 """
+_EMPTY_PLACE = """
+    UPDATE mapspeak.records SET said = NULL, changed = pg_current_xact_id()
+    WHERE kind = 'place' AND key = %s
+"""
+_PUT_PLACE_AS = """
+    INSERT INTO mapspeak.records (kind, key, said, position)
+    SELECT 'place', %s, %s, position FROM mapspeak.records WHERE kind = 'place' AND key = %s
+    ON CONFLICT (kind, key) DO UPDATE SET
+        said = excluded.said, changed = excluded.changed, position = excluded.position
+"""
 _FROM_THE_BEGINNING = "0"
 
 
@@ -229,6 +239,16 @@ class _Rows:
         rows = [(_PLACE, name_key(each.name), Jsonb(data_of(each))) for each in waypoints]
         with self._connection.cursor() as cursor:
             cursor.executemany(_UPSERT, rows)
+
+    def rename_place(self, former_key: str, waypoint: Waypoint) -> None:
+        """Write a place where the one of another `name_key` was, which is removed."""
+        key = name_key(waypoint.name)
+        if key == former_key:
+            self.put(waypoint)
+            return
+        said = Jsonb(data_of(waypoint))
+        self._connection.execute(_PUT_PLACE_AS, (key, said, former_key))
+        self._connection.execute(_EMPTY_PLACE, (former_key,))
 
 
 def _with_news(known: _Known, news: Sequence[tuple[str, str, int, str, Data]]) -> _Known:

@@ -119,22 +119,29 @@ class MapDocument(Contents):
             return self._read_again(sections)
         return self._with_section(Section(key=key, head=f"{entry}\n"), self._find_places())
 
-    def with_record(self, record: Record) -> "MapDocument":
+    def with_record(self, record: Record, *, former_key: str | None = None) -> "MapDocument":
         """Return the file with a record written, in place of the one with its key if there is one.
+
+        Args:
+            former_key: The key of the record to replace, if not the same; one that had the new key
+                is removed.
 
         Raises:
             SemanticMapError: The file is laid out in a way that cannot be written to.
         """
         list_key, key, data = list_key_of(record), key_of(record), data_of(record)
         items = self.lists[list_key]
-        item = items.get(key)
+        former_key = former_key or key
+        item = items.get(former_key)
         section = next((each for each in self.sections if each.key == list_key), None)
         if item is not None:
             if item.text is None or section is None:
                 raise self._layout_fault(list_key)
             text = _changed_text(item.text, data_of(item.record), data, section.indent)
             new = self._read_item(list_key, text, data)
-            return replace(self, lists={**self.lists, list_key: {**items, key: new}})
+            left = items if former_key == key else {k: v for k, v in items.items() if k != key}
+            changed = {(key if k == former_key else k): v for k, v in left.items()} | {key: new}
+            return replace(self, lists={**self.lists, list_key: changed})
         if section is None:
             text = _new_text(data, 2)
             at = self._find_places() if list_key == "frames" else len(self.sections)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store.memorystore import MemoryStore
+from mapspeak.memory.store.memorystore import MemoryStore, Records
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 
 Seen = tuple[str, str, float | None, float | None]
@@ -63,24 +63,22 @@ def restore(store: MemoryStore, name: str) -> Forgotten:
 
 
 def rename_place(store: MemoryStore, name: str, *, to: str) -> None:
-    """Rename a place; the old name is forgotten.
+    """Rename a place; nothing is left under the old name.
 
     Raises:
         SemanticMapError: There is no such place, or another one has that name.
     """
 
-    def change(known: SemanticMap) -> Iterable[Waypoint]:
-        named = {name_key(place.name): place for place in known.waypoints}
+    def change(records: Records) -> None:
+        named = {name_key(place.name): place for place in records.read().waypoints}
         place, taken = named.get(name_key(name)), named.get(name_key(to))
         if place is None or place.is_gone:
             raise SemanticMapError(f"Nothing is remembered as {name[:80]!r}.", hint="Look again.")
-        if taken is place:
-            return [replace(place, name=to)]
-        if taken is not None and not taken.is_gone:
+        if taken is not None and taken is not place and not taken.is_gone:
             raise SemanticMapError(f"Another place is called {to[:80]!r}.", hint="Choose a name.")
-        return [replace(place, name=to), replace(place, is_gone=True)]
+        records.rename_place(name_key(name), replace(place, name=to))
 
-    store.write_all(change)
+    store.change(change, alone=True)
 
 
 def _mark(store: MemoryStore, is_meant: _Test, *, is_gone: bool = True) -> Forgotten:

@@ -19,6 +19,7 @@ from mapspeak.memory.store.yamltext import Bare, Data, Path
 
 _NUMBER = r"-?\d+(?:\.\d+)?"
 _CORNER = re.compile(rf"\s*({_NUMBER})\s+({_NUMBER})\s*")
+_FULL_TURN_DEG = 360.0
 _TRUTHS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 
 
@@ -103,6 +104,13 @@ def _read_distance(value: Data) -> float:
     return number
 
 
+def _read_angle(value: Data) -> float:
+    degrees = _read_number(value)
+    if abs(degrees) > _FULL_TURN_DEG:
+        raise wrong("is not an angle from -360 to 360 degrees", value)
+    return math.radians(degrees)
+
+
 def _read_count(value: Data) -> int:
     number = _read_distance(value)
     if not number.is_integer():
@@ -181,8 +189,8 @@ def _same(value: str | None) -> Data:
 TEXT, WORDS, ID = (Form(read, _same) for read in (_read_text, _read_words, _read_id))
 NEEDED_ID = Form(lambda value: _read_id(_read_words(value)), _same)
 NUMBER, DISTANCE = (Form(read, _say_number) for read in (_read_number, _read_distance))
-BEARING = Form(lambda value: math.radians(_read_number(value)), _say_angle)
-HEADING = Form(lambda value: wrap_angle(math.radians(_read_number(value))), _say_angle)
+BEARING = Form(_read_angle, _say_angle)
+HEADING = Form(lambda value: wrap_angle(_read_angle(value)), _say_angle)
 # A hundred metres away this still is a millimetre.
 FINE_HEADING = Form(HEADING.read, lambda yaw_rad: Bare(f"{math.degrees(yaw_rad) + 0.0:.4f}"))
 COUNT = Form(_read_count, lambda number: Bare(number) if number else None)

@@ -60,6 +60,9 @@ class Records(Protocol):
     def put_places(self, waypoints: Iterable[Waypoint]) -> None:
         """Write many places."""
 
+    def rename_place(self, former_key: str, waypoint: Waypoint) -> None:
+        """Write a place where the one of another `name_key` was, which is removed."""
+
 
 class MemoryStore(ABC):
     """Places and events that outlive the server.

@@ -167,6 +167,10 @@ class _FileRecords:
         for waypoint in waypoints:
             self.put(waypoint)
 
+    def rename_place(self, former_key: str, waypoint: Waypoint) -> None:
+        """Write a place where the one of another `name_key` was, which is removed."""
+        self.document = self.document.with_record(waypoint, former_key=former_key)
+
 
 def _raised_again(fault: SemanticMapError | None) -> SemanticMapError:
     """Return a fresh copy of a kept fault, which would gather traces otherwise."""

@@ -1,0 +1,120 @@
+"""Things that are kept beside a large memory, and what becomes of them in a later session."""
+
+import pickle
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from drawing import grid_from_text
+from mapspeak.geometry import Pose
+from mapspeak.memory import Landmark, LaserFan, SemanticMap, Waypoint
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.keptthings import PlainReader, load_things
+from mapspeak.worldmodel.recollection import KEPT_FROM, THINGS_FILE, Recollector
+
+HALL = """
+    ####################
+    #..................#
+    #..................#
+    #..................#
+    ####################
+    """
+N_PLACES = KEPT_FROM // 2
+
+
+def _draw(cells: str = HALL) -> OccupancyGrid:
+    return grid_from_text(cells, resolution_m=0.5)
+
+
+def _remember(n_places: int = N_PLACES, *, label: str = "sink") -> SemanticMap:
+    return SemanticMap(
+        waypoints=tuple(
+            Waypoint(
+                name=f"place {number}",
+                pose=Pose(1.0 + number % 8, 1.2, 0.1 * number),
+                recorded_at=datetime(2026, 11, 2, tzinfo=UTC),
+                functional_landmarks=(
+                    Landmark(
+                        label=f"{label} {number}",
+                        bearing_rad=0.1,
+                        range_m=1.0,
+                        laser=LaserFan.read("from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m"),
+                    ),
+                    Landmark(label=f"tap {number}", bearing_rad=-0.1),
+                ),
+            )
+            for number in range(n_places)
+        )
+    )
+
+
+def _keep(folder: Path, memory: SemanticMap) -> Recollector:
+    recollector = Recollector(kept=folder)
+    recollector.recollect(memory, _draw())
+    recollector.keep_things()
+    return recollector
+
+
+def test_a_later_session_takes_the_things_that_were_kept(tmp_path: Path) -> None:
+    first = _keep(tmp_path, _remember()).latest
+    kept = load_things(tmp_path / THINGS_FILE)
+
+    later = Recollector(kept=tmp_path)
+    again = later.recollect(_remember(), _draw())
+
+    assert first is not None
+    assert kept is not None
+    assert kept.things == again.found.things == first.found.things
+    written = (tmp_path / THINGS_FILE).stat().st_mtime_ns
+    later.keep_things()
+    assert (tmp_path / THINGS_FILE).stat().st_mtime_ns == written
+
+
+def test_what_changed_since_is_joined_anew(tmp_path: Path) -> None:
+    _keep(tmp_path, _remember())
+    changed = _remember(label="basin")
+    other_map = _draw(HALL.replace("...........", ".....#.....", 1))
+
+    for memory, grid in ((changed, _draw()), (_remember(), other_map)):
+        again = Recollector(kept=tmp_path).recollect(memory, grid)
+        assert again.found.things == Recollector().recollect(memory, grid).found.things
+
+
+def test_the_things_of_a_small_memory_are_joined_and_not_kept(tmp_path: Path) -> None:
+    _keep(tmp_path, _remember(3))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("n_kept", [0, 10, 36, 1000, -1])
+def test_a_file_that_is_cut_off_is_passed_over(n_kept: int, tmp_path: Path) -> None:
+    _keep(tmp_path, _remember())
+    path = tmp_path / THINGS_FILE
+    path.write_bytes(path.read_bytes()[:n_kept])
+    assert load_things(path) is None
+    assert len(Recollector(kept=tmp_path).recollect(_remember(), _draw()).things) > 0
+
+
+def test_a_file_of_other_code_or_with_a_flaw_is_passed_over(tmp_path: Path) -> None:
+    _keep(tmp_path, _remember())
+    path = tmp_path / THINGS_FILE
+    content = path.read_bytes()
+    begin = content.index(pickle.PROTO + b"\x05")
+    for at in (0, begin + 50):
+        path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+        assert load_things(path) is None
+    path.write_bytes(content)
+    assert load_things(path) is not None
+
+
+@pytest.mark.parametrize("name", ["os.system", "mapspeak.cli.main", "builtins.eval"])
+def test_a_file_that_names_a_function_is_not_obeyed(name: str) -> None:
+    module, _, function = name.rpartition(".")
+    told = f"c{module}\n{function}\n(S'x'\ntR.".encode()
+    with pytest.raises(pickle.UnpicklingError):
+        PlainReader(memoryview(told), ()).load()
+
+
+def test_things_that_cannot_be_kept_are_used_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert _keep(tmp_path / "file", _remember()).latest is not None
