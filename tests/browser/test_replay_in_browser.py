@@ -1,11 +1,15 @@
 """A replay in a real browser, opened as a file without any server."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from mcp.client import Client
 
+from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.report.page import write_page
 from mapspeak.evaluation.trials import (
     ToolCall,
@@ -14,6 +18,13 @@ from mapspeak.evaluation.trials import (
     trial_folder,
     write_result,
 )
+from mapspeak.memory import SemanticMapStore
+from mapspeak.server.app import build_server
+from mapspeak.server.view.maplog import MAPS, MapLog
+from mapspeak.server.view.pages import build_replay_page
+from mapspeak.server.view.replay import replay_log
+from mapspeak.server.wire.calllog import CallLog
+from mapspeak.session import Session
 from reportmaking import make_result, make_trial, make_turns, write_course, write_trial
 
 playwright_api = pytest.importorskip("playwright.async_api")
@@ -88,6 +99,30 @@ async def test_a_replay_on_a_phone_and_in_the_dark_fits_its_width(replay: str) -
         assert await page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
         await page.click("#step-on")
         await stands_at(page, 2)
+
+
+async def test_the_map_grows_with_the_steps(tmp_path: Path) -> None:
+    robot, log = FakeRobot(two_rooms()), CallLog(tmp_path / "calls.jsonl")
+    store = SemanticMapStore(tmp_path / "m.yaml")
+    session = Session(robot, store, lease_s=60.0, find_model=lambda: None)
+    maps = MapLog(session, log.pictures / MAPS, log)
+    async with Client(build_server(session, call_log=maps)) as client:
+        await client.call_tool("look_at_map", {})
+        cells = np.where(np.arange(30) < 12, two_rooms().cells, -1).astype(np.int8)
+        robot.grid = replace(two_rooms(), cells=cells)
+        await client.call_tool("look_at_map", {})
+    page_file = tmp_path / "calls.html"
+    page_file.write_bytes(build_replay_page("calls", replay_log(log.path)))
+    async with browse(page_file.as_uri()) as page:
+        items, tile = page.locator("#items"), page.locator("#map img.leaflet-image-layer").last
+        await expect(items).to_contain_text("D1: door of R1 and R2")
+        first = await tile.get_attribute("src")
+        await page.click("#step-on")
+        await expect(items).not_to_contain_text("D1")
+        await expect(tile).not_to_have_attribute("src", first)
+        await page.click("#step-back")
+        await expect(items).to_contain_text("D1")
+        await expect(tile).to_have_attribute("src", first)
 
 
 async def test_hostile_text_is_text(tmp_path: Path) -> None:

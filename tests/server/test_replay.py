@@ -4,14 +4,19 @@ import json
 from pathlib import Path
 
 import pytest
+from mcp.client import Client
 
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.errors import ConfigError, PolicyError
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Caller, Publish, calling
+from mapspeak.server.app import build_server
+from mapspeak.server.view.maplog import MAPS, MapLog
 from mapspeak.server.view.replay import replay_log
 from mapspeak.server.wire.calllog import CallLog
+from mapspeak.session import Session
 from served import connect
 
 ROOM = """
@@ -42,6 +47,42 @@ async def test_a_call_log_is_replayed_with_pictures_and_poses(calls: Path) -> No
     assert pose.pose is not None
     assert (pose.pose.x, pose.pose.y, pose.n_trail) == (1.5, 1.4, 1)
     assert told.map is None
+
+
+@pytest.mark.anyio
+async def test_the_map_of_a_call_log_is_as_it_was_after_each_call(tmp_path: Path) -> None:
+    robot, log = FakeRobot(two_rooms()), CallLog(tmp_path / "calls.jsonl")
+    store = SemanticMapStore(tmp_path / "m.yaml", map_id="two-rooms")
+    session = Session(robot, store, lease_s=60.0, find_model=lambda: None)
+    maps = MapLog(session, log.pictures / MAPS, log)
+    async with Client(build_server(session, call_log=maps)) as client:
+        await client.call_tool("get_robot_pose", {})
+        await client.call_tool("look_at_map", {})
+        noted = {"name": "the spot", "description": "here"}
+        await client.call_tool("write_semantic_data", noted)
+        await client.call_tool("look_at_map", {})
+        robot.grid = grid_from_text(ROOM, resolution_m=1.0)
+        await client.call_tool("look_at_map", {})
+    told = replay_log(log.path)
+    assert [step.n_moments for step in told.steps] == [1, 1, 1, 2, 3]
+    first, noted_then, grown = told.moments
+    assert first.overlay["doors"].names == ["D1"]
+    assert (noted_then.map, list(noted_then.overlay)) == (None, ["places"])
+    assert [item["name"] for item in noted_then.overlay["places"].items] == ["the spot"]
+    assert grown.map is not None
+    assert (grown.map.n_rows, grown.map.n_cols) == (4, 8)
+    assert grown.overlay["doors"].names == []
+    assert told.map is not None
+    assert {name for row in grown.map.tiles for name in row} <= set(told.map.pictures or ())
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize("line", ["{}", '{"n_calls": 1, "map": 2}', "no json", "[]"])
+async def test_a_log_of_maps_that_is_none_is_refused(calls: Path, line: str) -> None:
+    (calls.with_suffix("") / MAPS).mkdir()
+    (calls.with_suffix("") / MAPS / "moments.jsonl").write_text(f"{line}\n")
+    with pytest.raises(ConfigError, match="no log of maps"):
+        replay_log(calls)
 
 
 @pytest.mark.anyio

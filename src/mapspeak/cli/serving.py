@@ -255,6 +255,7 @@ class _Served:
 async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path) -> _Served:
     """Open every robot, and build its server and what draws it."""
     from mapspeak.server.fleet import FleetServer  # noqa: PLC0415
+    from mapspeak.server.view.maplog import MAPS, MapLog  # noqa: PLC0415
     from mapspeak.server.wire.calllog import CallLog  # noqa: PLC0415
 
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
@@ -274,9 +275,13 @@ async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path)
         record=options.record,
         foxglove=options.foxglove,
     )
+    if call_log is not None and list(sessions) == [""]:
+        notes[""] = MapLog(sessions[""], call_log.pictures / MAPS, notes[""])
     servers = {
         name: _build_server(session, options, notes[name]) for name, session in sessions.items()
     }
+    for name, feed in page.feeds.items():
+        feed.book = servers[name].book
     return _Served(
         sessions=sessions.values(),
         server=next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers),

@@ -21,6 +21,8 @@ from mapspeak.simulator import WorldObject
 
 RESULT, TURNS = "result.json", "turns.jsonl"
 STATES, MAP, MEMORY = "state.jsonl", "map.yaml", "semantic_map.yaml"
+CALLS = "calls"
+"""The call log with the ending .jsonl, where the server keeps one, and the folder beside it."""
 PICTURES = "pictures"
 """Files and folders in a trial's folder."""
 TRIALS = "trials"

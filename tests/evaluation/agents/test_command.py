@@ -37,6 +37,7 @@ def assignment(folder: Path, prompt: str, *, wall_s: float = 60.0) -> Assignment
         *(sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"),
         *("--clock", "virtual", "--semantic-map", str(folder / "memory.yaml")),
         *("--audit", str(folder / "audit.jsonl"), "--control", str(folder / "control")),
+        *("--call-log", str(folder / "calls.jsonl")),
     )
     return Assignment(
         prompt=prompt,

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from mapspeak.errors import MapspeakError
 from mapspeak.evaluation.trials import (
+    CALLS,
     MAP,
     MEMORY,
     PICTURES,
@@ -24,14 +25,24 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.memory import SemanticMap, SemanticMapStore
 from mapspeak.server.view.document import CallView, GridView, PoseView
+from mapspeak.server.view.maplog import MAPS, Moment, read_moments
 from mapspeak.server.view.overlay import Overlay
 from mapspeak.server.view.pages import build_replay_page
-from mapspeak.server.view.replay import Replay, StepView, locate_pictures, show_map
+from mapspeak.server.view.replay import (
+    Replay,
+    StepView,
+    join_pictures,
+    locate_pictures,
+    show_map,
+    show_moments,
+)
 from mapspeak.simulator import StateRecord, read_state_log
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 
-OF_ITS_TIME = "as it was in the end; ids in answers are those of their time"
+AT_LAST = "as it was in the end; ids in answers are those of their time"
+GROWING = "as it was at each step"
+MAP_LOG = f"{CALLS}/{MAPS}"
 PAGE, REPLAY = "report.html", "replay.html"
 MOST_POINTS = 500
 
@@ -61,16 +72,23 @@ class ReplayWriter:
         turns: tuple[Turn, ...] = attempt(TURNS, lambda _: read_turns(self._run, trial), ())
         states: tuple[StateRecord, ...] = attempt(STATES, read_state_log, ())
         memory = attempt(MEMORY, lambda path: SemanticMapStore(path).read(), SemanticMap())
-        nothing: tuple[GridView | None, Overlay] = (None, Overlay())
-        shown, overlay = attempt(MAP, lambda path: self._show(load_map(path).grid, memory), nothing)
+        no_moments: tuple[Sequence[Moment], Mapping[str, str]] = ((), {})
+        moments, pictures = attempt(MAP_LOG, read_moments, no_moments)
+        nothing: tuple[GridView | None, Overlay] = (join_pictures(moments, pictures), Overlay())
+        shown, overlay = nothing
+        if not moments:
+            shown, overlay = attempt(
+                MAP, lambda path: self._show(load_map(path).grid, memory), nothing
+            )
         thinned = [*states[:: -(-len(states) // MOST_POINTS) or 1], *states[-1:]]
         replay = Replay(
-            about=[*_describe(result), ("map", OF_ITS_TIME), *faults],
+            about=[*_describe(result), ("map", GROWING if moments else AT_LAST), *faults],
             back=f"{'../' * (trial.id.count('/') + 2)}{PAGE}",
             map=shown,
             overlay=overlay,
+            moments=moments,
             trail=[(round(state.x, 2), round(state.y, 2)) for state in thinned],
-            steps=list(_steps(turns, thinned, folder / PICTURES)),
+            steps=list(_steps(turns, thinned, moments, folder / PICTURES)),
         )
         title = f"mapspeak: {trial.task} {trial.world} {trial.number:03d}"
         write_whole(folder / REPLAY, build_replay_page(title, replay))
@@ -111,8 +129,12 @@ def _describe(result: TrialResult) -> Iterator[tuple[str, str]]:
 
 
 def _steps(
-    turns: Sequence[Turn], states: Sequence[StateRecord], pictures: Path
+    turns: Sequence[Turn],
+    states: Sequence[StateRecord],
+    moments: Sequence[Moment],
+    pictures: Path,
 ) -> Iterator[StepView]:
+    n_calls = 0
     for number, group in enumerate(_group(turns), start=1):
         first, last = group[0], group[-1]
         told = first.call
@@ -132,12 +154,14 @@ def _steps(
             pictures=tuple(found),
             note="{:.1f} s{}".format(*times),
         )
-        yield StepView(
+        n_calls += last.role == "tool"
+        step = StepView(
             call=call,
             at_s=last.wall_s if robot_s is None else robot_s,
             pose=None if last.pose is None else PoseView.of(last.pose),
             n_trail=sum(state.time_s <= (robot_s or 0.0) for state in states),
         )
+        yield show_moments(step, moments, n_calls=n_calls)
 
 
 def _group(turns: Sequence[Turn]) -> list[list[Turn]]:

@@ -17,13 +17,14 @@ from mcp.server.mcpserver import MCPServer
 from mapspeak.evaluation.agent import ServerAccess
 from mapspeak.evaluation.inspected.playing import InspectedSystem, play
 from mapspeak.evaluation.scores.judging import NOWHERE
-from mapspeak.evaluation.trials import MAP, MEMORY, STATES, Setting, Trial
+from mapspeak.evaluation.trials import CALLS, MAP, MEMORY, STATES, Setting, Trial
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.view.maplog import MAPS, MapLog
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
 from mapspeak.simulator.worlds.worldfiles import write_as_changed
@@ -107,6 +108,7 @@ def _usual_options(toolsets: tuple[str, ...], folder: Path, control: Path) -> tu
         *("--toolsets", ",".join(toolsets)),
         *("--memory", str(folder / MEMORY)),
         *("--audit", str(folder / AUDIT)),
+        *("--call-log", str(folder / f"{CALLS}.jsonl")),
         *("--control", str(control)),
     )
 
@@ -162,6 +164,7 @@ async def _open_in_memory(setup: TrialSetup) -> AsyncGenerator[Workplace]:
         toolsets=setup.toolsets,
         tools=setting.tools,
         representation=Representation(setup.trial.representation),
+        call_log=MapLog(session, setup.folder / CALLS / MAPS),
     )
     try:
         async with anyio.create_task_group() as tasks:

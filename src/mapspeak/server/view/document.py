@@ -57,14 +57,15 @@ class GridView(ViewPart):
     pictures: Mapping[str, str] | None = None
 
     @classmethod
-    def of(cls, grid: OccupancyGrid) -> "GridView":
+    def of(cls, grid: OccupancyGrid, *, tile_cells: int = TILE_CELLS) -> "GridView":
         """Name the tiles of a map."""
         return cls(
             origin=PoseView.of(grid.origin),
             resolution_m=grid.resolution_m,
             n_rows=grid.n_rows,
             n_cols=grid.n_cols,
-            tiles=name_tiles(grid),
+            tile_cells=tile_cells,
+            tiles=name_tiles(grid, tile_cells=tile_cells),
         )
 
     @classmethod
@@ -72,7 +73,7 @@ class GridView(ViewPart):
         """Draw all tiles but those that the reader has already."""
         view = cls.of(grid)
         pictures = {
-            name: f"data:image/png;base64,{base64.b64encode(draw_tile(grid, row, col)).decode()}"
+            name: embed_tile(draw_tile(grid, row, col))
             for row, names in enumerate(view.tiles)
             for col, name in enumerate(names)
             if name and name not in known
@@ -152,33 +153,34 @@ class CallView(ViewPart):
 # --- the map as square pictures, of which a page fetches anew only those that have changed ---
 
 
-def name_tiles(grid: OccupancyGrid) -> list[list[str]]:
+def name_tiles(grid: OccupancyGrid, *, tile_cells: int = TILE_CELLS) -> list[list[str]]:
     """Return a name for what each tile shows, row by row from the grid's origin; "" for nothing."""
     return [
-        [_name(_cut(grid, row, col)) for col in range(_count(grid.n_cols))]
-        for row in range(_count(grid.n_rows))
+        [_name(_cut(grid, row, col, tile_cells)) for col in range(-(-grid.n_cols // tile_cells))]
+        for row in range(-(-grid.n_rows // tile_cells))
     ]
 
 
-def draw_tile(grid: OccupancyGrid, row: int, col: int) -> bytes:
+def draw_tile(grid: OccupancyGrid, row: int, col: int, *, tile_cells: int = TILE_CELLS) -> bytes:
     """Return a tile as PNG, a pixel a cell, the row farthest from the origin on top.
 
     Grey 255 is free, 0 occupied, the unknown transparent: the page gives it its own colour.
     """
-    cells = _cut(grid, row, col)[::-1]
+    cells = _cut(grid, row, col, tile_cells)[::-1]
     known = cells >= 0
     grey = np.where(known, np.round(255 - 2.55 * np.clip(cells, 0, 100)), UNKNOWN_GREY)
     drawn = np.dstack([grey, grey, grey, np.where(known, 255, 0)]).astype(np.uint8)
     return bytes(cv2.imencode(".png", drawn)[1])
 
 
-def _count(n_cells: int) -> int:
-    return -(-n_cells // TILE_CELLS)
+def embed_tile(png: bytes) -> str:
+    """Return a tile as a data URL, for a page without a server."""
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
 
-def _cut(grid: OccupancyGrid, row: int, col: int) -> NDArray[np.int8]:
-    rows = slice(row * TILE_CELLS, (row + 1) * TILE_CELLS)
-    cols = slice(col * TILE_CELLS, (col + 1) * TILE_CELLS)
+def _cut(grid: OccupancyGrid, row: int, col: int, tile_cells: int) -> NDArray[np.int8]:
+    rows = slice(row * tile_cells, (row + 1) * tile_cells)
+    cols = slice(col * tile_cells, (col + 1) * tile_cells)
     return grid.cells[rows, cols]
 
 

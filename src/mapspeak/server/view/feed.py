@@ -15,7 +15,14 @@ from mapspeak.robot import CameraPicture
 from mapspeak.server.text.skills import draw_mission, say_question
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.view.calls import CallFeed
-from mapspeak.server.view.document import CallView, GridView, MissionsView, PoseView, RobotView
+from mapspeak.server.view.document import (
+    CallView,
+    GridView,
+    MissionsView,
+    PoseView,
+    RobotView,
+    draw_tile,
+)
 from mapspeak.server.view.overlay import Overlay
 from mapspeak.server.view.robotlook import RobotLook
 from mapspeak.session import Session
@@ -26,7 +33,7 @@ POSE_S = 0.1
 IDLE_S = 1.0
 MAP_EVERY = 10
 """Every so many looks at the pose, look at the map and send pages a sign of life."""
-PICTURE_S = 0.5
+PICTURE_S = 1.0
 """Pages that ask within that time of each other are given the same picture."""
 MOST_UNREAD = 200
 """A page that reads no more than that is let go; it comes back when it can."""
@@ -52,6 +59,7 @@ class ViewFeed:
         self.people: set[str] = set()
         self.book: SkillBook | None = None
         self._grids: tuple[tuple[OccupancyGrid, GridView], ...] = ()
+        self._drawn: dict[str, bytes] = {}
         self._pages: set[MemoryObjectSendStream[bytes]] = set()
         self._has_page = anyio.Event()
         self._map: GridView | None = None
@@ -132,11 +140,15 @@ class ViewFeed:
                 self._pages.discard(page)
                 page.close()
 
-    def find_grid(self, row: int, col: int, name: str) -> OccupancyGrid | None:
-        """Return the map that has such a tile: the latest, or the one before it."""
+    async def draw(self, row: int, col: int, name: str) -> bytes | None:
+        """Return a tile of the latest map or the one before it, drawn once for all pages."""
         for grid, view in self._grids:
             if row < len(view.tiles) and col < len(view.tiles[0]) and view.tiles[row][col] == name:
-                return grid
+                if name not in self._drawn:
+                    self._drawn[name] = await self.session.compute(
+                        partial(draw_tile, grid, row, col)
+                    )
+                return self._drawn[name]
         return None
 
     async def see(self) -> CameraPicture:
@@ -169,6 +181,8 @@ class ViewFeed:
         if (shown := await self.session.compute(partial(GridView.of, grid))) != self._map:
             self._map = shown
             self._grids = (*self._grids[-1:], (grid, shown))
+            known = {name for _, view in self._grids for names in view.tiles for name in names}
+            self._drawn = {name: png for name, png in self._drawn.items() if name in known}
             self._tell(_event("map", shown.model_dump()))
         world = self.session.world
         if world is not None:

@@ -12,6 +12,7 @@ from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.safety import AuditLine, read_audit
 from mapspeak.server.view.document import CallView, GridView, PoseView, Spot, ViewPart
+from mapspeak.server.view.maplog import MAPS, Moment, read_moments
 from mapspeak.server.view.overlay import Overlay
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
@@ -29,6 +30,7 @@ class StepView(ViewPart):
         pose: Where the robot stood; None where it is not known.
         goal: Where it was sent.
         n_trail: Points of the trail until then.
+        n_moments: Moments of the map until then.
     """
 
     call: CallView
@@ -36,6 +38,7 @@ class StepView(ViewPart):
     pose: PoseView | None = None
     goal: PoseView | None = None
     n_trail: int = 0
+    n_moments: int = 0
 
 
 class Replay(ViewPart):
@@ -44,12 +47,15 @@ class Replay(ViewPart):
     Attributes:
         about: What it is, as names and values.
         back: Address of the page that lists others; empty where there is none.
+        map: The map of all steps, and what lies on it; where there are moments, their pictures.
+        moments: The map as it was, each time with what has changed.
     """
 
     about: Sequence[tuple[str, str]] = ()
     back: str = ""
     map: GridView | None = None
     overlay: Overlay = Overlay()
+    moments: Sequence[Moment] = ()
     trail: Sequence[Spot] = ()
     steps: Sequence[StepView] = ()
 
@@ -80,16 +86,33 @@ def replay_log(path: Path, grid: OccupancyGrid | None = None) -> Replay:
     if first is None:
         raise ConfigError(f"{path} is empty.", hint="Give a log in which something was noted.")
     is_audit = "event" in first
+    moments, pictures = ((), {}) if is_audit else read_moments(path.with_suffix("") / MAPS)
     steps = _steps_of_audit(read_audit(path)) if is_audit else _steps_of_calls(path)
     shown, overlay = (None, Overlay()) if grid is None else show_map(grid)
     told = list(steps)
+    if grid is None and moments:
+        shown = join_pictures(moments, pictures)
+        told = [show_moments(step, moments, n_calls=step.call.number) for step in told]
     return Replay(
         about=[("log", path.name), ("kind", "audit log" if is_audit else "call log")],
         map=shown,
         overlay=overlay,
+        moments=moments if grid is None else (),
         trail=[(step.pose.x, step.pose.y) for step in told if step.pose is not None],
         steps=told,
     )
+
+
+def join_pictures(moments: Sequence[Moment], pictures: Mapping[str, str]) -> GridView | None:
+    """Return the latest map of some moments with the pictures of all."""
+    latest = next((each.map for each in reversed(moments) if each.map is not None), None)
+    return None if latest is None else latest.model_copy(update={"pictures": pictures})
+
+
+def show_moments(step: StepView, moments: Sequence[Moment], *, n_calls: int) -> StepView:
+    """Return a step with the map as it was when that many calls had ended."""
+    n_moments = sum(each.n_calls <= n_calls for each in moments)
+    return step.model_copy(update={"n_moments": n_moments})
 
 
 def _read_lines(path: Path) -> Iterator[Mapping[str, Any]]:

@@ -23,7 +23,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.server.view.commands import PersonCommands
-from mapspeak.server.view.document import draw_tile
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import NOBODY, PageKeys
 from mapspeak.server.view.pages import find_leaflet_files, find_page_files, link_page
@@ -163,11 +162,9 @@ class LiveSite:
     async def show_tile(self, request: Request) -> Response:
         """Answer with a tile of the map; its name says what it shows, so it may be kept."""
         feed, wanted = self._find(request), request.path_params
-        row, col = wanted["row"], wanted["col"]
-        grid = feed.find_grid(row, col, wanted["name"])
-        if grid is None:
+        png = await feed.draw(wanted["row"], wanted["col"], wanted["name"])
+        if png is None:
             raise HTTPException(HTTPStatus.NOT_FOUND)
-        png = await feed.session.compute(lambda: draw_tile(grid, row, col))
         kept = {"cache-control": "private, max-age=3600, immutable"}
         return Response(png, media_type="image/png", headers=kept)
 
@@ -286,10 +283,18 @@ class _SafeHeaders:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, and add to the answer's headers."""
+        has_begun = False
 
         async def send_safely(message: Message) -> None:
+            nonlocal has_begun
             if message["type"] == "http.response.start":
+                has_begun = True
                 message = {**message, "headers": [*message["headers"], *HEADERS]}
             await send(message)
 
-        await self._app(scope, receive, send_safely)
+        try:
+            await self._app(scope, receive, send_safely)
+        except anyio.get_cancelled_exc_class():
+            # The server ends: the web server would fill the terminal with what each page waits for.
+            if not has_begun:
+                await _say("The server ends.", 503)(scope, receive, send_safely)

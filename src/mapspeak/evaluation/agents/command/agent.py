@@ -26,7 +26,7 @@ from mapspeak.evaluation.agent import (
 from mapspeak.evaluation.agents.command import keeper
 from mapspeak.evaluation.agents.command.program import ALWAYS, ANSWER, Program
 from mapspeak.evaluation.agents.models.chat import Thinking
-from mapspeak.evaluation.trials import TrialState
+from mapspeak.evaluation.trials import CALLS, TrialState
 
 EVERY_S = 0.1
 MOST_BYTES = 4_000_000
@@ -151,8 +151,8 @@ async def run_program(
     Raises:
         LinkError: The program failed by itself.
     """
-    folder, log = task.folder / "client", task.folder / "calls.jsonl"
-    server, answer = (*task.server, "--call-log", str(log)), folder / ANSWER
+    folder, log = task.folder / "client", task.folder / f"{CALLS}.jsonl"
+    server, answer = task.server, folder / ANSWER
     folder.mkdir(parents=True, exist_ok=True)
     program.write_config(server, folder)
     log.unlink(missing_ok=True)

@@ -16,6 +16,8 @@ const NAMES_FROM_PX_PER_M = 12;
 /** From here on doors, frontiers, places and things have their names beside them. */
 const ALL_NAMES_FROM_PX_PER_M = 45;
 const MARKS = { rooms: "▰", closed: "▰", doors: "●", frontiers: "○", things: "●", places: "●", trail: "—", path: "┅" };
+/** Places no farther apart share their name on the map. */
+const STACK_M = 0.5;
 const TRAIL_M = 0.25;
 const MOST_TRAIL = 4000;
 
@@ -202,6 +204,7 @@ class MapView {
       this.put(L.circleMarker(this.place(thing.at), { radius: 4, color: "#cc79a7", fillOpacity: 0.9 }), things,
         `${thing.name}, within ${thing.radius_m} m`, { kind: "thing", id: thing.id, name: thing.name }, thing.at);
     });
+    this.namePlaces(overlay.places, places);
     this.showNames();
     this.index?.replaceChildren(...this.listed.map(({ said, item, at }) => {
       const [row, button] = [document.createElement("li"), document.createElement("button")];
@@ -225,11 +228,26 @@ class MapView {
     this.listed.push({ said, item, at });
     shape.bindTooltip(plain(said), { sticky: true }).addTo(layer);
     if (["door", "frontier"].includes(item.kind)) this.name(item.id, at, layer, "name near");
-    if (["place", "thing"].includes(item.kind)) this.name(item.name ?? "", at, layer, "name near");
+    if (item.kind === "thing") this.name(item.name ?? "", at, layer, "name near");
     shape.on("click", (/** @type {any} */ event) => {
       L.DomEvent.stopPropagation(event);
       this.click(event.latlng, item);
     });
+  }
+
+  /** Name places; those that lie on one spot have one name, such as "W46 and 3 more".
+   * @param {{id: string, name: string, at: number[]}[]} places @param {any} layer */
+  namePlaces(places, layer) {
+    /** @type {Map<string, {id: string, name: string, at: number[]}[]>} */
+    const spots = new Map();
+    for (const place of places) {
+      const spot = place.at.map((each) => Math.round(each / STACK_M)).join();
+      spots.set(spot, [...spots.get(spot) ?? [], place]);
+    }
+    for (const stack of spots.values()) {
+      const said = stack.length > 1 ? `${stack[0].id} and ${stack.length - 1} more` : stack[0].name;
+      this.name(said, stack[0].at, layer, "name near");
+    }
   }
 
   /** @param {string} text @param {number[]} at @param {any} layer @param {string} className */

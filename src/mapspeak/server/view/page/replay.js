@@ -4,11 +4,21 @@
 
 /**
  * @typedef {{call: Call, at_s: number, pose: {x: number, y: number, yaw_deg: number} | null,
- *   goal: {x: number, y: number, yaw_deg: number} | null, n_trail: number}} Step
+ *   goal: {x: number, y: number, yaw_deg: number} | null, n_trail: number, n_moments: number}} Step
  */
 
 const LONGEST_S = 4;
 const SHORTEST_S = 0.15;
+
+/** Return the parts of an overlay that a moment changes, as they are then.
+ * @param {any} before @param {Record<string, {names: string[], items: any[]}>} changes */
+function change(before, changes) {
+  const name = (/** @type {any} */ item) => item.id ?? item.title;
+  return Object.fromEntries(Object.entries(changes).map(([part, { names, items }]) => {
+    const known = new Map([...before[part], ...items].map((item) => [name(item), item]));
+    return [part, names.map((each) => known.get(each)).filter(Boolean)];
+  }));
+}
 
 class Replay {
   /** @param {any} told the document */
@@ -23,6 +33,15 @@ class Replay {
     this.map = new MapView(byId("map"), { index: byId("items") });
     this.calls = new Calls(byId("calls"), { isNewestFirst: false, most: Infinity });
     this.describe(told);
+    this.pictures = told.map?.pictures ?? {};
+    this.nothing = told.map && { ...told.map, tiles: [] };
+    /** The map and all on it after each moment. @type {{map: any, overlay: any}[]} */
+    this.moments = [{ map: this.nothing, overlay: told.overlay }];
+    for (const { map, overlay } of told.moments) {
+      const before = this.moments[this.moments.length - 1];
+      this.moments.push({ map: map ?? before.map, overlay: { ...before.overlay, ...change(before.overlay, overlay) } });
+    }
+    this.shown = -1;
     if (told.map) this.map.showMap(told.map);
     else this.map.fit([...this.trail, ...this.steps.flatMap(({ goal }) => (goal ? [[goal.x, goal.y]] : []))]);
     this.map.showOverlay(told.overlay);
@@ -93,10 +112,20 @@ class Replay {
     const { pose } = step;
     const stood = pose ? ` at x ${pose.x.toFixed(2)}, y ${pose.y.toFixed(2)}, ${pose.yaw_deg.toFixed(0)}°` : "";
     byId("state").textContent = `${step.at_s.toFixed(1)} s${stood}`;
+    this.showMoment(step.n_moments);
     this.map.showTrail(this.trail.slice(0, step.n_trail));
     this.map.showRobot({ pose: pose ?? this.pose, goal: step.goal });
     this.pose = pose ?? this.pose;
     this.showSeen();
+  }
+
+  /** Show the map as it then was, where that is known. @param {number} index */
+  showMoment(index) {
+    if (this.moments.length === 1 || index === this.shown) return;
+    const [before, { map, overlay }] = [this.moments[this.shown], this.moments[index]];
+    if (map !== before?.map) this.map.showMap({ ...map, pictures: this.pictures });
+    this.map.showOverlay(overlay);
+    this.shown = index;
   }
 
   /** Show the picture that was seen last. */
