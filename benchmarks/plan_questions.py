@@ -45,6 +45,7 @@ SIZES = re.compile(
     r"the largest is (R\d+|O\d+) ",
     re.MULTILINE,
 )
+PART = re.compile(r"^([RO]\d+) \| .* \(probably part of ([RO]\d+): D\d+\)", re.MULTILINE)
 ROW = re.compile(r"^([RO]\d+) \| (-?[\d.]+), (-?[\d.]+) \| ([\d.]+) \|", re.MULTILINE)
 KINDS = ("second smallest", "largest", "count", "way", "nearest")
 
@@ -83,8 +84,11 @@ async def ask(grid: OccupancyGrid, start: Pose, folder: Path) -> Answers:
     sizes = SIZES.search(look)
     if sizes is None:
         raise AssertionError(look)
+    # Two rooms that are probably parts of each other are one; the count leaves both out.
+    parts = dict(PART.findall(look))
+    n_pairs = sum(parts.get(other) == name for name, other in parts.items()) // 2
     return Answers(
-        n_rooms=int(sizes[1]),
+        n_rooms=int(sizes[1]) + n_pairs,
         second=sizes[3],
         largest=sizes[4],
         places={

@@ -143,6 +143,28 @@ def test_a_wall_goes_on_behind_a_cupboard() -> None:
     assert door.width_m == pytest.approx(0.75, abs=0.2)
 
 
+def test_a_wall_between_cupboards_on_both_sides_divides_two_rooms() -> None:
+    """Two rooms of 5.4 by 4.6 m beside a corridor; a slit between two cupboards shows the wall."""
+    cells = np.full((188, 168), 100, np.int8)
+    cells[4:92, 4:112] = cells[96:184, 4:112] = cells[4:184, 116:164] = 0
+    cells[60:78, 112:116] = cells[150:168, 112:116] = 0
+    cells[74:92, 4:41] = cells[74:92, 44:76] = cells[96:114, 76:112] = 100
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert len(rooms.regions) == 3
+
+
+def test_a_desk_in_line_with_the_end_of_a_wall_divides_no_room() -> None:
+    """An L-shaped room around a closet, with a desk of 0.9 m at the wall across from its corner."""
+    cells = np.full((100, 116), 100, np.int8)
+    cells[4:96, 4:112] = 0
+    cells[4:54, 60:64] = cells[50:54, 60:112] = 100
+    cells[42:60, 4:44] = 100
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert len(rooms.regions) == 2
+
+
 def test_furniture_is_told_from_walls_however_the_map_is_turned() -> None:
     upright = _grid(CUPBOARDS_FACE_TO_FACE)
     mirrored = OccupancyGrid(cells=np.transpose(upright.cells), resolution_m=CELL_M)

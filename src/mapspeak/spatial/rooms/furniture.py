@@ -18,13 +18,9 @@ from mapspeak.spatial.rooms.raster import (
     find_fixed,
     is_near,
     is_short,
-    last_place,
     line_along,
     open_box,
-    places,
-    put_lines,
     run_lengths,
-    take_lines,
     widen,
 )
 
@@ -34,8 +30,6 @@ _RIM_M = 0.15
 """Crumbs this near to a block belong to it: the rim of a plant, the legs of a chair."""
 _CRUMB_M = 1.0
 """Remains of an obstacle without its blocks are crumbs if smaller across than this."""
-_SEEN_RATIO = 0.5
-"""Least share of a block's border to the floor that was seen as an obstacle."""
 _FILLED_RATIO = 0.7
 """Least share that a block at a wall fills of its rectangle, square to the walls."""
 _WHOLE_RATIO = 0.85
@@ -52,7 +46,7 @@ def find_blocks(raster: Raster, wall: Picture) -> tuple[Picture, Picture]:
         wall: 1 on presumed wall; only wall continues behind furniture.
     """
     solid = 1 - drop_specks(raster.free, _SPECK_M2 / raster.cell_area_m2)
-    block, behind = _find_blocks(solid, raster.occupied, wall, _Sizes(solid, raster.cell_size_m))
+    block, behind = _find_blocks(solid, wall, _Sizes(solid, raster.cell_size_m))
     return block, behind & (1 - block)
 
 
@@ -65,7 +59,6 @@ class _Sizes:
         thick: Blocks are at most this thick in at least one direction.
         long: Largest distance to the floor beside a block.
         tip: Largest distance from the middle of a wall to floor.
-        gap: The widest door whose wall continues in line.
     """
 
     def __init__(self, solid: Picture, cell_size_m: float) -> None:
@@ -78,7 +71,6 @@ class _Sizes:
         self.long = round(SETTINGS.block_length_m / cell_size_m)
         self.stub = round(SETTINGS.stub_m / cell_size_m) | 1
         self.tip = round(SETTINGS.tip_m / cell_size_m)
-        self.gap = round(SETTINGS.wall_length_m / cell_size_m)
         self.rim = round(_RIM_M / cell_size_m)
         self.crumb = _CRUMB_M / cell_size_m
 
@@ -96,9 +88,7 @@ def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
     return float(np.median(all_of_them)) if all_of_them.size >= least else 0.0
 
 
-def _find_blocks(
-    solid: Picture, occupied: Picture, seen_wall: Picture, cells: _Sizes
-) -> tuple[Picture, Picture]:
+def _find_blocks(solid: Picture, seen_wall: Picture, cells: _Sizes) -> tuple[Picture, Picture]:
     if cells.thin >= cells.thick:
         return np.zeros_like(solid), np.zeros_like(solid)
     bump = open_box(_find_bumps(solid, cells), cells.thin, cells.thin)
@@ -108,7 +98,7 @@ def _find_blocks(
     piece = open_box(bump & (1 - wall), cells.depth, cells.depth)
     rest = solid & (1 - piece)
     fixed = drop_small(rest, cells.crumb)
-    block = _choose_blocks(piece, fixed, occupied, cells)
+    block = _choose_blocks(piece, fixed, solid, cells)
     crumb = rest & (1 - fixed)
     block |= _find_touching(crumb & (1 - find_fixed(solid)), block)
     block |= widen(block, cells.rim) & crumb
@@ -129,29 +119,28 @@ def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
 
 def _continue_walls(solid: Picture, bump: Picture, seen_wall: Picture, cells: _Sizes) -> Picture:
     """Return 1 in bumps where walls that end at them run on in line."""
-    stubs = [_find_stubs(solid, bump, seen_wall, axis, cells) for axis in (0, 1)]
     wall = np.zeros_like(solid)
-    for axis, stub in enumerate(stubs):
-        lines = _find_lines(stub, bump, axis)
-        near = is_near(1 - solid, cells.tip, 1 - axis).astype(np.uint8)
-        s, through, is_at_floor = (take_lines(each, lines, axis) for each in (stub, solid, near))
-        (before, _), (behind, _) = _reach(s, through, axis, cells)
-        put_lines(wall, (before & behind) | ((before | behind) & (is_at_floor > 0)), lines, axis)
-    wall &= bump
-    inner = bump & (1 - wall)
-    for axis, stub in enumerate(stubs):
-        lines = _find_lines(stub, bump, axis)
-        s, whole, through = (take_lines(each, lines, axis) for each in (stub, solid, inner))
-        (before, over), (behind, back_over) = _reach(s, through, axis, cells)
-        # A wall goes on behind a door if it has something there to end at.
-        ends_back, ends = _find_ends(whole, through, axis)
-        put_lines(wall, before | behind | (over & ends) | (back_over & ends_back), lines, axis)
-    return wall
+    for axis in (0, 1):
+        stub = _find_stubs(solid, bump, seen_wall, axis, cells)
+        lines = np.flatnonzero(stub.any(axis=axis) & bump.any(axis=axis))
+        if lines.size:
+            s, through = (np.take(part, lines, axis=1 - axis) > 0 for part in (stub, solid))
+            here = (slice(None), lines) if axis == 0 else (lines, slice(None))
+            wall[here] |= _run_on(s, through, axis, cells.long)
+    return wall & bump
 
 
-def _find_lines(stub: Picture, bump: Picture, axis: int) -> Counts:
-    """Return the lines along an axis on which a wall may run on into a bump."""
-    return np.flatnonzero(stub.any(axis=axis) & bump.any(axis=axis))
+def _run_on(stub: Truths, through: Truths, axis: int, longest: int) -> Truths:
+    """Return the cells to go through that lead from a stub along an axis, in either direction."""
+    found = np.zeros_like(stub)
+    place = np.arange(stub.shape[axis]).reshape((-1, 1) if axis == 0 else (1, -1))
+    for flipped in (False, True):
+        s, t = (np.flip(part, axis) if flipped else part for part in (stub, through))
+        last_stub = np.maximum.accumulate(np.where(s, place, -longest - 1), axis=axis)
+        last_other = np.maximum.accumulate(np.where(s | t, -longest - 1, place), axis=axis)
+        leads = t & (last_other <= last_stub) & (place - last_stub <= longest)
+        found |= np.flip(leads, axis) if flipped else leads
+    return found
 
 
 def _find_stubs(
@@ -173,49 +162,14 @@ def _find_stubs(
     return np.asarray(long & held & is_thin, np.uint8)
 
 
-def _reach(
-    stub: Picture, through: Picture, axis: int, cells: _Sizes
-) -> list[tuple[Truths, Truths]]:
-    """Return where a stub comes before a cell and no gap, and where a gap like a door or none.
-
-    First for those that come before it along an axis, then for those that come behind. What may
-    lie between is `through`.
-    """
-    found = []
-    for flipped in (False, True):
-        s, t = (np.flip(part, axis) if flipped else part for part in (stub > 0, through > 0))
-        n = s.shape[axis]
-        to_stub = last_place(s, axis, none=-2 * n)
-        gap = last_place(~(s | t), axis, none=-n) - to_stub
-        is_near_by = t & (places(s.shape, axis) - to_stub <= cells.long + cells.gap)
-        # Without a gap, the last of what may not lie between comes before the stub.
-        straight = is_near_by & (gap <= 0) & (places(s.shape, axis) - to_stub <= cells.long)
-        over = is_near_by & (gap <= cells.gap)
-        found.append(tuple(np.flip(part, axis) if flipped else part for part in (straight, over)))
-    return [(straight, over) for straight, over in found]
-
-
-def _find_ends(solid: Picture, inner: Picture, axis: int) -> list[Truths]:
-    """Return where the way back, and the way on, leads out of a bump into what is solid."""
-    found = []
-    is_end = (solid > 0) & (inner == 0)
-    for flipped in (False, True):
-        i, end = (np.flip(part, axis) if flipped else part for part in (inner > 0, is_end))
-        last = last_place(~i, axis, none=-1)
-        at_end = np.take_along_axis(end, np.maximum(last, 0).astype(np.intp), axis)
-        leads = i & at_end & (last >= 0)
-        found.append(np.flip(leads, axis) if flipped else leads)
-    return found
-
-
 # --- choice ----------------------------------------------------------------------------------
 
 
-def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Sizes) -> Picture:
+def _choose_blocks(piece: Picture, fixed: Picture, solid: Picture, cells: _Sizes) -> Picture:
     """Return the pieces that are furniture."""
     n, label = cv2.connectedComponents(piece, connectivity=4)
     numbers = np.asarray(label, np.int32)
-    floor = 1 - (fixed | piece)
+    floor = 1 - solid
     # The cells in and beside each piece have its number.
     grown = cv2.dilate(numbers.astype(np.float32), np.ones((3, 3), np.uint8))
     around = np.asarray(grown, np.int32)
@@ -223,7 +177,6 @@ def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Si
     is_at_wall = _fills_rectangle(numbers, n, cells) & (n_contact >= cells.depth)
     is_block = (n_contact == 0) | is_at_wall
     is_block &= _count_sides(around, n, floor, piece, cells) == 1
-    is_block &= _seen_ratio(numbers, n, floor, occupied) >= _SEEN_RATIO
     is_block[numbers[open_box(piece, cells.thick, cells.thick) > 0]] = False
     is_block[0] = False
     return np.asarray(is_block[numbers], np.uint8)
@@ -240,15 +193,6 @@ def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells:
     pairs, counts = np.unique(np.stack([around[here], stretch[here]]), axis=1, return_counts=True)
     least = max(cells.rim, 1)
     return np.bincount(pairs[0][counts >= least], minlength=n)
-
-
-def _seen_ratio(label: Numbers, n: int, floor: Picture, occupied: Picture) -> NDArray[np.float64]:
-    """Return the share of each piece's border to the floor at which something was seen."""
-    edge = (widen(floor, 1) > 0) & (label > 0)
-    n_edge = np.bincount(label[edge], minlength=n)
-    n_seen = np.bincount(label[edge & (widen(occupied, 1) > 0)], minlength=n)
-    ratio: NDArray[np.float64] = n_seen / np.maximum(n_edge, 1)
-    return ratio
 
 
 def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:

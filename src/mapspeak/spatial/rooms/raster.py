@@ -307,33 +307,6 @@ def run_lengths(solid: Picture, axis: int) -> tuple[NDArray[np.intp], NDArray[np
     return (row * lines.shape[1] + col)[ends], (stop - first)[ends]
 
 
-def take_lines(picture: Picture, lines: Places, axis: int) -> Picture:
-    """Return these lines of a picture along an axis: columns along 0, rows along 1."""
-    return np.take(picture, lines, axis=1 - axis)
-
-
-def put_lines(picture: Picture, found: Truths, lines: Places, axis: int) -> None:
-    """Set the cells found in these lines of a picture."""
-    here = (slice(None), lines) if axis == 0 else (lines, slice(None))
-    picture[here] |= found.astype(np.uint8)
-
-
-def last_place(is_set: Truths, axis: int, *, none: int) -> Numbers:
-    """Return for each cell the place of the last cell set up to it, along an axis."""
-    here = places(is_set.shape, axis)
-    marked = np.where(is_set, here, here.dtype.type(none))
-    return np.asarray(np.maximum.accumulate(marked, axis=axis))
-
-
-def places(shape: tuple[int, ...], axis: int) -> Numbers:
-    """Return the rows, or the columns, of all cells, to be broadcast."""
-    # Small numbers are accumulated faster; the places of no cell are negative.
-    n = shape[axis]
-    is_small = 3 * n < np.iinfo(np.int16).max
-    here: Numbers = np.arange(n, dtype=np.int16) if is_small else np.arange(n, dtype=np.int32)
-    return here.reshape((-1, 1) if axis == 0 else (1, -1))
-
-
 def drop_specks(free: Picture, least: float) -> Picture:
     """Return the floor without parts of fewer cells."""
     _, label, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)

@@ -38,8 +38,6 @@ from mapspeak.spatial.rooms.raster import (
 
 _APART_M = 0.4
 """Openings nearer than this to each other, one behind the other, are one doorway."""
-_SHARED_M = 0.3
-"""Jambs nearer than this to each other are ends of one wall."""
 _DRIFT_RATIO = 0.25
 """A wall that leaves its line by more than this share of the way does not run along it."""
 
@@ -86,8 +84,7 @@ def find_doorways(raster: Raster, floor: Floor) -> list[Doorway]:
     back = np.array([[1.0, 0.0, -margin], [0.0, 1.0, -margin]])
     rows = _find_along_rows(pictures, back, raster)
     cols = _find_along_rows(sideways, back[:, [1, 0, 2]], raster)
-    reach = _SHARED_M / raster.cell_size_m
-    return _leave_out_crossing(rows, cols, reach) + _leave_out_crossing(cols, rows, reach)
+    return rows + cols
 
 
 def _find_along_rows(pictures: list[Picture], back: Affine, raster: Raster) -> list[Doorway]:
@@ -194,26 +191,6 @@ def _doorway(
 def _run(solid: Picture) -> int:
     """Return how many cells are solid before the first that is not."""
     return int(np.argmin(solid)) if not solid.all() else solid.size
-
-
-def _leave_out_crossing(
-    doorways: list[Doorway], others: list[Doorway], reach: float
-) -> list[Doorway]:
-    """Leave out what crosses a corridor from the end of the wall between two rooms.
-
-    The doorways of those two rooms, at right angles to it, each have a jamb there.
-    """
-    jambs = np.array([jamb for other in others for jamb in (other.start, other.end)])
-
-    def is_between_rooms(jamb: Spot) -> bool:
-        near = np.hypot(*(jambs - jamb).T) <= reach if jambs.size else np.zeros(0, bool)
-        return int(near.sum()) >= 2
-
-    return [
-        doorway
-        for doorway in doorways
-        if not is_between_rooms(doorway.start) and not is_between_rooms(doorway.end)
-    ]
 
 
 Labels = NDArray[np.int32]
