@@ -1,5 +1,6 @@
 """The tree of frames as a model reads it, with what is wrong with it."""
 
+import math
 import re
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
-from mapspeak.server.tools.ros.measuring import FrameLink, say_frames
+from mapspeak.server.tools.ros.frames import FrameLink, say_frames
 from rosbridge_robot import ScriptedRobot
 from rosserved import at_time, on_script, publishing
 
@@ -102,3 +103,31 @@ async def test_frames_of_a_robot_without_any_are_refused_with_the_topics_there_a
     async with on_script(ScriptedRobot(), tmp_path) as caller:
         text = await caller.refuse("ros_frames", topic="/robot1/tf")
     assert "/tf" in text
+
+
+async def test_the_transform_between_two_frames_is_told_with_the_way_between_them(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    turn = math.sqrt(0.5)  # A quarter turn about x: the laser's y looks up.
+    laser = FrameTransform(
+        parent_from_child=Pose(0.1, 0.0), parent="base_footprint", child="laser", stamp_s=1.0,
+        height_m=0.3, rotation=(turn, 0.0, 0.0, turn),
+    )  # fmt: skip
+    camera = FrameTransform(
+        parent_from_child=Pose(0.3, 0.0, math.pi / 2), parent="base_footprint", child="camera",
+        stamp_s=1.0, height_m=0.5,
+    )  # fmt: skip
+    scripted.latched["/tf_static"] = write_transforms([laser, camera], dialect=Dialect.ROS2)
+    async with on_script(scripted, tmp_path) as caller:
+        text = await caller.ask("ros_frames", duration_s=0.4, frame="camera", in_frame="laser")
+        mounted = await caller.ask(
+            "ros_frames", duration_s=0.4, frame="laser", in_frame="base_footprint"
+        )
+        gap = await caller.refuse("ros_frames", duration_s=0.2, frame="arm", in_frame="laser")
+    assert text == (
+        "camera in laser: x 0.200, y 0.200, z 0.000 m; roll -90.0, pitch 90.0, yaw 0.0 deg\n"
+        "way: laser > base_footprint > camera"
+    )
+    assert "x 0.100, y 0.000, z 0.300 m; roll 90.0, pitch 0.0, yaw 0.0 deg" in mounted
+    assert "no frame 'arm'" in gap

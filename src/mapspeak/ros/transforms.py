@@ -1,9 +1,12 @@
 """The tree of coordinate frames that ROS keeps in /tf and /tf_static, as far as it was heard."""
 
+import math
 from collections.abc import Iterable
 from functools import partial
 
 import anyio
+import numpy as np
+from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
@@ -80,6 +83,15 @@ class TransformTree:
             return self._way_up(outer=outer, inner=one), up
         raise self._gap(outer=one, passed=[other])
 
+    def find_matrix(self, outer: str, inner: str) -> NDArray[np.float64]:
+        """Return outer_from_inner in space, shape (4, 4), for any two frames of one tree.
+
+        Raises:
+            LinkError: No chain of transforms joins the two.
+        """
+        from_outer, from_inner = self.find_ways(outer, inner)
+        return np.linalg.inv(_chain(from_outer)) @ _chain(from_inner)
+
     def _way_up(self, *, outer: str, inner: str) -> list[FrameTransform]:
         way: list[FrameTransform] = []
         passed = [inner]
@@ -112,6 +124,27 @@ class TransformTree:
             f"{outer!r}.",
             hint=TF_HINT,
         )
+
+
+def _chain(way_up: Iterable[FrameTransform]) -> NDArray[np.float64]:
+    """Return the matrix from the lowest frame of a way to the highest."""
+    matrix = np.eye(4)
+    for transform in way_up:
+        matrix = _matrix(transform) @ matrix
+    return matrix
+
+
+def _matrix(transform: FrameTransform) -> NDArray[np.float64]:
+    pose, half_rad = transform.parent_from_child, transform.parent_from_child.yaw_rad / 2
+    x, y, z, w = transform.rotation or (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), pose.x],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), pose.y],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), transform.height_m],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 class FrameListener:

@@ -4,7 +4,7 @@ Scans are transformed by the mounting pose of the laser.
 """
 
 import math
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 import anyio
@@ -17,7 +17,6 @@ from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE, RobotPart, RobotProfile
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
-from mapspeak.ros.messages.poses import FrameTransform
 from mapspeak.ros.messages.scans import LaserScan, read_fov_rad, read_scan
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
@@ -152,8 +151,7 @@ def find_mounting(tree: TransformTree, *, base: str, sensor: str) -> NDArray[np.
     Raises:
         LinkError: The frames do not say, or it looks up or down.
     """
-    from_base, from_sensor = tree.find_ways(base, sensor)
-    base_from_sensor = np.linalg.inv(_chain(from_base)) @ _chain(from_sensor)
+    base_from_sensor = tree.find_matrix(base, sensor)
     tilt_rad = math.acos(min(abs(float(base_from_sensor[2, 2])), 1.0))
     if tilt_rad > MOST_TILT_RAD:
         raise LinkError(
@@ -172,27 +170,6 @@ def place_beams(
     ends = np.stack([ranges_m * np.cos(angles_rad), ranges_m * np.sin(angles_rad)])
     x, y = base_from_sensor[:2, :2] @ ends + base_from_sensor[:2, 3:]
     return np.arctan2(y, x), np.hypot(x, y)
-
-
-def _chain(way_up: Iterable[FrameTransform]) -> NDArray[np.float64]:
-    """Return the matrix from the lowest frame of a way to the highest."""
-    matrix = np.eye(4)
-    for transform in way_up:
-        matrix = _matrix(transform) @ matrix
-    return matrix
-
-
-def _matrix(transform: FrameTransform) -> NDArray[np.float64]:
-    pose, half_rad = transform.parent_from_child, transform.parent_from_child.yaw_rad / 2
-    x, y, z, w = transform.rotation or (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), pose.x],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), pose.y],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), transform.height_m],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
 
 
 STALE_S = 1.0

@@ -15,9 +15,9 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.ros.commands import RosCommands
+from mapspeak.server.tools.ros.frames import check_frames
 from mapspeak.server.tools.ros.goals import ActionBook, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
-from mapspeak.server.tools.ros.measuring import check_frames
 from mapspeak.server.tools.ros.reports import (
     Filter,
     Page,

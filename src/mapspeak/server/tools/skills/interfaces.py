@@ -12,9 +12,9 @@ from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.messages.fields import Message
 from mapspeak.safety import Act, Call, Publish, zero_velocity_of
 from mapspeak.server.tools.ros.commands import VELOCITIES, PublishRequest
+from mapspeak.server.tools.ros.frames import check_frames
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import Described
-from mapspeak.server.tools.ros.measuring import check_frames
 from mapspeak.server.tools.ros.reading import hear
 from mapspeak.server.tools.ros.views import BULKY
 from mapspeak.skill import (
