@@ -30,7 +30,7 @@ from mapspeak.robot import GoalState
 from mapspeak.server.text.findings import say_comparison
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, World, load_world
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.frontiers import find_frontiers
+from mapspeak.spatial.frontiers import Tried, find_frontiers
 from mapspeak.spatial.mapfiles import load_map, load_picture
 
 __all__ = ["main", "measure"]
@@ -124,7 +124,7 @@ def map_world(world: World, *, seed: int, n_drives: int) -> OccupancyGrid:
             simulation.map(),
             simulation.pose_in_map.point,
             radius_m=BODY_RADIUS_M,
-            looked_from=tuple(tried),
+            tried=Tried(looked_from=tuple(tried)),
         )
         if not report.frontiers:
             break

@@ -16,6 +16,7 @@ from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.episodewriter import EpisodeWriter, Keeping
 from mapspeak.driving.stops import Lease
+from mapspeak.driving.tried import FrontierTries
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore, PictureBook, SemanticMap
@@ -36,7 +37,7 @@ from mapspeak.ros.port import RosConnection, started_over
 from mapspeak.safety import Guard, GuardedRobot, Surveyor, WhenBusy, guard_connection
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.model import WorldModel, revise
 from mapspeak.worldmodel.recollection import Recollector
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -116,6 +117,7 @@ class Session:
         self._rank: VectorRank | None = None
         self._ranking = threading.Lock()
         self.recollector = Recollector(find_model, kept=folder)
+        self._tries = FrontierTries()
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
         self.world: WorldModel | None = None
@@ -167,12 +169,16 @@ class Session:
             revision, warnings = await self._survey(grid)
             if revision is not None and await self._learn(revision):
                 revision, warnings = await self._survey(grid)
+            radius_m, at = self.robot.description.radius_m, stamped.pose.point
+            if revision is None:
+                revision = revise(grid, self.world, radius_m=radius_m)
+            await self.compute(partial(self._tries.learn, self.drives.ended, revision, at))
             self.world = WorldModel(
                 grid,
                 stamped.pose,
                 replace(memory, warnings=(*memory.warnings, *warnings)),
-                radius_m=self.robot.description.radius_m,
-                looked_from=self.drives.frontiers_tried,
+                radius_m=radius_m,
+                tried=self._tries.find_tried(revision),
                 previous=self.world,
                 revision=revision,
                 recollector=self.recollector,

@@ -13,7 +13,9 @@ from mapspeak.spatial.frontiers import (
     FrontierReport,
     FrontierVerdict,
     RefusalReason,
+    Tried,
     find_frontiers,
+    find_proved_gap,
     remaining_ratio,
 )
 from mapspeak.spatial.paths import clearance_m, distances_from
@@ -47,7 +49,7 @@ def find(
     text: str, robot: Point, *, resolution_m: float = 0.2, looked_from: tuple[Point, ...] = ()
 ) -> FrontierReport:
     grid = grid_from_text(text, resolution_m=resolution_m)
-    return find_frontiers(grid, robot, radius_m=RADIUS_M, looked_from=looked_from)
+    return find_frontiers(grid, robot, radius_m=RADIUS_M, tried=Tried(looked_from=looked_from))
 
 
 def reasons(report: FrontierReport) -> set[RefusalReason]:
@@ -342,3 +344,53 @@ def test_a_corner_on_the_way_comes_before_what_would_mean_to_come_back() -> None
     assert corner.detour_m == pytest.approx(0.0)
     assert hall.merits == (FrontierMerit.MOST_PER_METRE,)
     assert hall.detour_m == pytest.approx(15.0, abs=0.5)
+
+
+GAP_BESIDE_THE_UNKNOWN = """
+    ##################################????
+    #...............##...............?????
+    #...............##...............?????
+    #...............##...............?????
+    #................................?????
+    #................................?????
+    #................................?????
+    #...............##...............?????
+    #...............##...............?????
+    #...............##...............?????
+    ##################################????
+    """
+
+
+def test_what_lies_behind_a_gap_that_the_robot_did_not_pass_is_not_offered() -> None:
+    robot = Point(1.0, 1.0)
+    grid = grid_from_text(GAP_BESIDE_THE_UNKNOWN, resolution_m=0.2)
+    goal = find_frontiers(grid, robot, radius_m=0.29).frontiers[0].pose.point
+    gap = find_proved_gap(distances_from(grid, robot, radius_m=0.29), goal)
+    assert gap is not None
+    again = find_frontiers(grid, robot, radius_m=0.29, tried=Tried(gaps=(gap,)))
+    assert not again.frontiers
+    (refused,) = again.refused
+    assert refused.reason is RefusalReason.PROVED_NARROW
+    assert refused.gap_at == gap.point
+
+
+def test_a_gap_that_the_map_shows_wider_is_tried_again() -> None:
+    robot = Point(1.0, 1.0)
+    grid = grid_from_text(GAP_BESIDE_THE_UNKNOWN, resolution_m=0.2)
+    goal = find_frontiers(grid, robot, radius_m=0.29).frontiers[0].pose.point
+    gap = find_proved_gap(distances_from(grid, robot, radius_m=0.29), goal)
+    assert gap is not None
+    rows = GAP_BESIDE_THE_UNKNOWN.splitlines()
+    wider_rows = [*rows[:4], rows[5], *rows[5:8], rows[7], *rows[9:]]
+    wider = grid_from_text("\n".join(wider_rows), resolution_m=0.2)
+    assert find_frontiers(wider, robot, radius_m=0.29, tried=Tried(gaps=(gap,))).frontiers
+
+
+def test_a_gap_counts_no_more_for_a_robot_that_is_on_its_other_side() -> None:
+    robot = Point(1.0, 1.0)
+    grid = grid_from_text(GAP_BESIDE_THE_UNKNOWN, resolution_m=0.2)
+    goal = find_frontiers(grid, robot, radius_m=0.29).frontiers[0].pose.point
+    gap = find_proved_gap(distances_from(grid, robot, radius_m=0.29), goal)
+    assert gap is not None
+    beyond = find_frontiers(grid, Point(5.0, 1.0), radius_m=0.29, tried=Tried(gaps=(gap,)))
+    assert beyond.frontiers

@@ -1,6 +1,7 @@
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
+from mapspeak.spatial.frontiers import Tried
 from mapspeak.worldmodel.model import WorldModel
 
 TWO_HALVES = grid_from_text(
@@ -25,7 +26,7 @@ def _world(robot: Pose, previous: WorldModel | None = None, *looked_from: Point)
         SemanticMap(),
         radius_m=0.2,
         previous=previous,
-        looked_from=looked_from,
+        tried=Tried(looked_from=looked_from),
     )
 
 

@@ -21,11 +21,10 @@ from mapspeak.driving.drivereport import (
     Drive,
     DriveReport,
     find_failed,
-    find_tried_frontiers,
 )
 from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot
 from mapspeak.safety import WhenBusy
@@ -83,9 +82,9 @@ class DriveBook:
         return next((each for each in reversed(self._drives.values()) if each.final), None)
 
     @property
-    def frontiers_tried(self) -> tuple[Point, ...]:
-        """Where the robot has arrived, or lately could not get to, when sent to a frontier."""
-        return find_tried_frontiers(self._drives.values())
+    def ended(self) -> tuple[Drive, ...]:
+        """The drives that have ended, as far as anyone has asked; the oldest first."""
+        return tuple(each for each in self._drives.values() if each.final)
 
     @property
     def failed(self) -> tuple[Drive, ...]:

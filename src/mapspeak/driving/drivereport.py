@@ -9,10 +9,6 @@ from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 
 JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
-RETRY_AFTER = 4
-"""Drives to other frontiers, before one that was blocked is tried again."""
-RETRY_GROWTH = 4
-AROUND_M = 3.0
 FRONTIER = re.compile(r"F\d+")
 
 
@@ -69,30 +65,6 @@ class DriveReport:
     silence: str
     is_stop_owed: bool
     elapsed_s: float
-
-
-def find_tried_frontiers(drives: Iterable[Drive]) -> tuple[Point, ...]:
-    """Return the frontiers at which the robot has arrived, or to which it lately found no way.
-
-    A blocked one is worth another try later, when more is known of the way: the later, the more
-    often the robot was blocked around there.
-
-    Args:
-        drives: The oldest first.
-    """
-    ended = [each for each in drives if each.final and FRONTIER.fullmatch(each.place)]
-    tried: list[Point] = []
-    blocked: list[Point] = []
-    for n_since, drive in zip(range(len(ended) - 1, -1, -1), ended, strict=True):
-        at, state = drive.goal.point, None if drive.final is None else drive.final.state
-        if state is GoalState.ARRIVED:
-            tried.append(at)
-        elif state is GoalState.BLOCKED:
-            n_before = sum(each.distance_to(at) <= AROUND_M for each in blocked)
-            blocked.append(at)
-            if n_since < RETRY_AFTER * RETRY_GROWTH**n_before:
-                tried.append(at)
-    return tuple(tried)
 
 
 SAME_GOAL_M = 0.5

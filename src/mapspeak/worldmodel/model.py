@@ -1,6 +1,6 @@
 """The world model: rooms, doors, frontiers and remembered places of the map, under ids."""
 
-from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
@@ -22,7 +22,9 @@ from mapspeak.memory.things.approach import (
 from mapspeak.robot import PoseDoubt
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import (
+    NOTHING_TRIED,
     FrontierReport,
+    Tried,
     find_frontiers,
     match_frontiers,
     rerank_frontiers,
@@ -104,7 +106,7 @@ class Reach:
     crossings: dict[str, Point | None] = field(default_factory=dict)
     standing: dict[str, Point | None] = field(default_factory=dict)
     out_of_reach: dict[str, Point] = field(default_factory=dict)
-    frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
+    frontiers: dict[Tried, FrontierReport] = field(default_factory=dict)
     approaches: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
     overlooks: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
     faced: ThingMap[float] = field(default_factory=WeakKeyDictionary)
@@ -113,11 +115,19 @@ class Reach:
     judges: WeakKeyDictionary[Recollection, Judge] = field(default_factory=WeakKeyDictionary)
 
 
+def revise(grid: OccupancyGrid, previous: "WorldModel | None", *, radius_m: float) -> MapRevision:
+    """Return the state of a map with nothing closed on it: the one before, while it holds."""
+    before = None if previous is None else previous.map
+    if before is not None and before.is_of(grid):
+        return before
+    return MapRevision(grid, radius_m=radius_m, previous=before, leaves_pockets=True)
+
+
 class WorldModel:
     """A state of the map with everything that has an id; parts are computed when first asked for.
 
     Args:
-        looked_from: Places of former frontiers that the robot has been to.
+        tried: What the robot's drives to frontiers have shown.
         previous: The one before, whose ids are kept and whose parts are used where they hold.
         revision: The state of the map, if it is already built.
         recollector: Keeps what is made of the memory; that of `previous` where None.
@@ -136,7 +146,7 @@ class WorldModel:
         memory: SemanticMap,
         *,
         radius_m: float,
-        looked_from: Sequence[Point] = (),
+        tried: Tried = NOTHING_TRIED,
         previous: "WorldModel | None" = None,
         revision: MapRevision | None = None,
         recollector: Recollector | None = None,
@@ -144,13 +154,7 @@ class WorldModel:
         is_radius_assumed: bool = False,
         now: datetime | None = None,
     ) -> None:
-        before = None if previous is None else previous.map
-        is_unchanged = before is not None and before.is_of(grid)
-        self.map: MapRevision = revision or (
-            before
-            if before is not None and is_unchanged
-            else MapRevision(grid, radius_m=radius_m, previous=before, leaves_pockets=True)
-        )
+        self.map: MapRevision = revision or revise(grid, previous, radius_m=radius_m)
         self.robot = robot
         self.pose_doubt = pose_doubt
         self.is_radius_assumed = is_radius_assumed
@@ -165,7 +169,7 @@ class WorldModel:
         self.recollector: Recollector = recollector or (
             Recollector() if previous is None else previous.recollector
         )
-        self._looked_from = tuple(looked_from)
+        self._tried = tried
         self._previous_frontiers = None if previous is None else previous.latest_frontiers
         has_only_moved = previous is not None and previous.map is self.map
         self._earlier_reach = previous.latest_reach if previous and has_only_moved else None
@@ -201,7 +205,7 @@ class WorldModel:
     @cached_property
     def frontiers(self) -> FrontierReport:
         """Where the known meets the unknown, best first; poses stay while the map does."""
-        known = self.reach.frontiers.get(self._looked_from)
+        known = self.reach.frontiers.get(self._tried)
         moved = None if known is None else rerank_frontiers(known, self.distances)
         if moved is not None:
             return moved
@@ -210,11 +214,11 @@ class WorldModel:
             self.robot.point,
             radius_m=self.radius_m,
             distances=self.distances,
-            looked_from=self._looked_from,
+            tried=self._tried,
         )
         earlier = self._previous_frontiers
         named = found if earlier is None else match_frontiers(earlier, found)
-        self.reach.frontiers[self._looked_from] = named
+        self.reach.frontiers[self._tried] = named
         return named
 
     @property

@@ -71,7 +71,11 @@ def test_merits_are_short_however_much_there_is_to_say() -> None:
         (RefusalReason.NO_WAY, "behind a wall: no way over known floor"),
         (RefusalReason.TOO_NARROW, "gap of 0.2 m, the robot needs 0.40 m"),
         (RefusalReason.NOTHING_TO_SEE, "0.12 m2 to see, less than 0.50 m2"),
-        (RefusalReason.LOOKED_ALREADY, "visited or tried already, nothing new came into view"),
+        (RefusalReason.LOOKED_ALREADY, "visited already, nothing new came into view"),
+        (
+            RefusalReason.DRIVE_FAILED,
+            "a drive there failed, and the map has not changed there since",
+        ),
         (RefusalReason.CLOSED_OFF, "behind what is closed: no way while it is"),
     ],
 )

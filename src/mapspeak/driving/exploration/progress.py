@@ -21,7 +21,14 @@ from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = 0.5
 """A border is reachable from floor within the robot's radius plus this."""
-OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW, RefusalReason.CLOSED_OFF})
+OUT_OF_REACH = frozenset(
+    {
+        RefusalReason.NO_WAY,
+        RefusalReason.TOO_NARROW,
+        RefusalReason.PROVED_NARROW,
+        RefusalReason.CLOSED_OFF,
+    }
+)
 
 
 class ExplorationState(StrEnum):

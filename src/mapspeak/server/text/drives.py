@@ -205,6 +205,7 @@ def _say_rest(progress: Progress) -> str:
     counted = (
         (reasons[RefusalReason.CLOSED_OFF], f"behind what is closed ({closed})"),
         (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
+        (reasons[RefusalReason.PROVED_NARROW], "behind gaps that a drive did not pass"),
         (reasons[RefusalReason.NO_WAY], "behind walls"),
         (len(progress.blocked), "where driving there failed"),
     )

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from mapspeak.server.text.wording import say_point
 from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierMerit,
@@ -108,10 +109,12 @@ MERITS = {
     FrontierMerit.NEAREST: "nearest",
 }
 REFUSED = {
-    RefusalReason.LOOKED_ALREADY: "visited or tried already",
+    RefusalReason.LOOKED_ALREADY: "visited already",
     RefusalReason.NOTHING_TO_SEE: "with little to see",
     RefusalReason.NO_WAY: "behind walls",
     RefusalReason.TOO_NARROW: "too narrow for the robot",
+    RefusalReason.PROVED_NARROW: "behind gaps that it did not pass",
+    RefusalReason.DRIVE_FAILED: "where a drive failed",
 }
 """Of reasons that are equally frequent, the first is told first."""
 
@@ -137,20 +140,29 @@ def _say_detour(detour_m: float | None) -> str:
     return f"a detour of {detour_m:.0f} m"
 
 
+REFUSALS = {
+    RefusalReason.NO_WAY: "behind a wall: no way over known floor",
+    RefusalReason.LOOKED_ALREADY: "visited already, nothing new came into view",
+    RefusalReason.DRIVE_FAILED: "a drive there failed, and the map has not changed there since",
+    RefusalReason.CLOSED_OFF: "behind what is closed: no way while it is",
+}
+
+
 def say_refusal(border: RefusedFrontier) -> str:
     """Say why a border with the unknown is no place to go."""
     match border.reason:
-        case RefusalReason.NO_WAY:
-            return "behind a wall: no way over known floor"
         case RefusalReason.TOO_NARROW:
             needed_m = border.needed_width_m
             return f"gap of {border.gap_width_m:.1f} m, the robot needs {needed_m:.2f} m"
+        case RefusalReason.PROVED_NARROW:
+            where = "" if border.gap_at is None else f" at {say_point(border.gap_at)}"
+            return (
+                f"behind the gap{where}, {border.gap_width_m:.2f} m wide by the map: a drive found "
+                "no way through it"
+            )
         case RefusalReason.NOTHING_TO_SEE:
             return f"{border.gain_m2:.2f} m2 to see, less than {border.least_gain_m2:.2f} m2"
-        case RefusalReason.LOOKED_ALREADY:
-            return "visited or tried already, nothing new came into view"
-        case RefusalReason.CLOSED_OFF:
-            return "behind what is closed: no way while it is"
+    return REFUSALS[border.reason]
 
 
 def say_verdict(report: FrontierReport) -> str:

@@ -68,6 +68,10 @@ class RefusalReason(StrEnum):
     TOO_NARROW = "too_narrow"
     NOTHING_TO_SEE = "nothing_to_see"
     LOOKED_ALREADY = "looked_already"
+    DRIVE_FAILED = "drive_failed"
+    """A drive there failed, and the map has not changed there since."""
+    PROVED_NARROW = "proved_narrow"
+    """Behind a gap that the robot did not pass."""
     CLOSED_OFF = "closed_off"
     """No way leads there while areas are closed."""
 
@@ -79,6 +83,7 @@ class RefusedFrontier:
     Attributes:
         anchor: One of its cells, near its middle.
         gap_width_m: Width of the way at its narrowest, if too narrow.
+        gap_at: Where the gap is that the robot did not pass.
         needed_width_m: Width of the robot, if the way is too narrow.
         gain_m2: Expected gain, if there is too little to see.
         least_gain_m2: Gain worth a drive, if there is too little to see.
@@ -88,6 +93,7 @@ class RefusedFrontier:
     length_m: float
     reason: RefusalReason
     gap_width_m: float = 0.0
+    gap_at: Point | None = None
     needed_width_m: float = 0.0
     gain_m2: float = 0.0
     least_gain_m2: float = 0.0

@@ -21,6 +21,7 @@ from mapspeak.spatial.frontiers.frontier import (
     RefusalReason,
     RefusedFrontier,
 )
+from mapspeak.spatial.frontiers.gaps import NOTHING_TRIED, Tried, mask_behind
 from mapspeak.spatial.frontiers.ranking import gain_rate, rank
 from mapspeak.spatial.frontiers.viewpoints import (
     FrontierViewpoint,
@@ -43,19 +44,19 @@ def find_frontiers(
     *,
     radius_m: float,
     distances: DistanceField | None = None,
-    looked_from: Sequence[Point] = (),
+    tried: Tried = NOTHING_TRIED,
 ) -> FrontierReport:
     """Find goals where the robot can see more, best first, and refused borders with reasons.
 
     Args:
         distances: From that position on that map, if already known.
-        looked_from: Poses of frontiers that the robot has visited: what remains unknown from
-            there cannot be seen, and is refused instead of being offered forever.
+        tried: What drives have shown: what remains unknown from a visited pose, or lies behind a
+            gap that the robot did not pass, is refused instead of being offered forever.
     """
     if distances is None:
         distances = distances_from(grid, position, radius_m=radius_m)
     borders, n_short = find_borders(grid, least_length_m=radius_m)
-    frontiers, refused = _judge(distances, borders, looked_from)
+    frontiers, refused = _judge(distances, borders, tried)
     ranked, ways = rank(distances, merge_by_place(frontiers))
     return FrontierReport(
         frontiers=tuple(
@@ -101,7 +102,7 @@ def _verdict(
 
 
 def _judge(
-    distances: DistanceField, borders: Sequence[Border], looked_from: Sequence[Point]
+    distances: DistanceField, borders: Sequence[Border], tried: Tried
 ) -> tuple[list[Frontier], list[RefusedFrontier]]:
     """Return each border as a frontier with its best pose, or as refused.
 
@@ -112,12 +113,13 @@ def _judge(
     poor: list[tuple[Border, float]] = []
     cut_off: list[Border] = []
     open_ones: list[tuple[Border, list[FrontierViewpoint]]] = []
-    for border, viewpoints in zip(borders, find_viewpoints(distances, borders), strict=True):
-        new = _without_looked(distances, viewpoints, looked_from)
-        if new:
+    all_viewpoints = find_viewpoints(distances, borders)
+    new_ones = _without_tried(distances, all_viewpoints, tried)
+    for border, viewpoints, new in zip(borders, all_viewpoints, new_ones, strict=True):
+        if isinstance(new, list):
             open_ones.append((border, new))
         elif viewpoints:
-            refused.append(_refuse(distances, border, RefusalReason.LOOKED_ALREADY))
+            refused.append(_refuse_tried(distances, border, new, tried))
         elif border.length_m >= NOISE_M:
             cut_off.append(border)
     # One and a half robots' width squared, a hundredth of the floor, or 0.5 m2 are worth a drive:
@@ -132,25 +134,42 @@ def _judge(
     parts_beyond = find_parts_beyond(distances, [border for border, _ in poor])
     for (border, gain_m2), beyond in zip(poor, parts_beyond, strict=True):
         if beyond is None:
-            gains = {"gain_m2": gain_m2, "least_gain_m2": least_m2}
-            refused.append(_refuse(distances, border, RefusalReason.NOTHING_TO_SEE, **gains))
+            why = RefusalReason.NOTHING_TO_SEE
+            refused.append(_refuse(distances, border, why, gain_m2=gain_m2, least_gain_m2=least_m2))
         else:
             cut_off.append(beyond)
     return frontiers, refused + _refuse_cut_off(distances, cut_off)
 
 
-def _without_looked(
-    distances: DistanceField, viewpoints: list[FrontierViewpoint], looked_from: Sequence[Point]
-) -> list[FrontierViewpoint]:
-    """Return the viewpoints from which the robot has not looked yet."""
-    return [
-        viewpoint
-        for viewpoint in viewpoints
-        if all(
-            distances.grid.point_at(viewpoint.cell).distance_to(looked) > LOOKED_NEAR_M
-            for looked in looked_from
-        )
-    ]
+def _without_tried(
+    distances: DistanceField, viewpoints: Sequence[list[FrontierViewpoint]], tried: Tried
+) -> list[list[FrontierViewpoint] | RefusalReason]:
+    """Return the viewpoints of each border that no drive has tried; the reason where none is left.
+
+    Behind a gap that the robot did not pass all are tried.
+    """
+    behind = mask_behind(distances, tried.gaps) if tried.gaps else None
+    kept: list[list[FrontierViewpoint] | RefusalReason] = []
+    for own in viewpoints:
+        before = [
+            each for each in own if behind is None or not behind[each.cell.row, each.cell.col]
+        ]
+        unseen = [each for each in before if not _is_near(distances, each, tried.looked_from)]
+        new = [each for each in unseen if not _is_near(distances, each, tried.failed_at)]
+        if new:
+            kept.append(new)
+        elif not before:
+            kept.append(RefusalReason.PROVED_NARROW)
+        else:
+            kept.append(RefusalReason.DRIVE_FAILED if unseen else RefusalReason.LOOKED_ALREADY)
+    return kept
+
+
+def _is_near(
+    distances: DistanceField, viewpoint: FrontierViewpoint, places: Sequence[Point]
+) -> bool:
+    at = distances.grid.point_at(viewpoint.cell)
+    return any(at.distance_to(place) <= LOOKED_NEAR_M for place in places)
 
 
 def _find_poses(
@@ -188,13 +207,37 @@ def _find_poses(
     return frontiers
 
 
+def _refuse_tried(
+    distances: DistanceField, border: Border, reason: RefusalReason, tried: Tried
+) -> RefusedFrontier:
+    """Refuse a border for what drives have shown; of several gaps the nearest is named."""
+    refused = _refuse(distances, border, reason)
+    if reason is not RefusalReason.PROVED_NARROW:
+        return refused
+    gap = min(tried.gaps, key=lambda each: each.point.distance_to(refused.anchor))
+    return dataclasses.replace(refused, gap_at=gap.point, gap_width_m=gap.width_m)
+
+
 def _refuse(
-    distances: DistanceField, border: Border, reason: RefusalReason, **numbers: float
+    distances: DistanceField,
+    border: Border,
+    reason: RefusalReason,
+    *,
+    gap_width_m: float = 0.0,
+    needed_width_m: float = 0.0,
+    gain_m2: float = 0.0,
+    least_gain_m2: float = 0.0,
 ) -> RefusedFrontier:
     middle = find_middle(border.rows, border.cols)
     anchor = Cell(int(border.rows[middle]), int(border.cols[middle]))
     return RefusedFrontier(
-        anchor=distances.grid.point_at(anchor), length_m=border.length_m, reason=reason, **numbers
+        anchor=distances.grid.point_at(anchor),
+        length_m=border.length_m,
+        reason=reason,
+        gap_width_m=gap_width_m,
+        needed_width_m=needed_width_m,
+        gain_m2=gain_m2,
+        least_gain_m2=least_gain_m2,
     )
 
 
