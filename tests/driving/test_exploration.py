@@ -13,6 +13,7 @@ from mapspeak.driving.exploration.progress import BoundKind, Bounds, Exploration
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
+from mapspeak.server.text.drives import say_progress
 from mapspeak.simulator import World
 from mapspeak.spatial.frontiers import RefusalReason
 from roaming import RoamingRobot, session_of, world_from_text
@@ -336,3 +337,44 @@ def test_a_place_that_was_blocked_twice_is_tried_no_more_while_nothing_changes()
         places.remember("F1", goal, stuck=goal.point, end=TripEnd(cause=CRATE), grid=grid)
     assert not places.worth_another_try(grid)
     assert [place.n_tries for place in places] == [2]
+
+
+async def test_the_metres_of_an_exploration_are_those_of_its_own_drives(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    session = session_of(robot, tmp_path)
+    explorer = Explorer(session)
+    before = await _explore(explorer, Bounds(stops_at_goals=True))
+    with session.drives.preparing() as ticket:
+        drive = await session.drives.start(Pose(0.0, 0.0), place="the start", ticket=ticket)
+    await session.drives.wait(drive.goal_id, wait_s=60.0, on_progress=_tell_nobody)
+    driven_m = session.drives.driven_m
+    after = await _explore(explorer, Bounds(stops_at_goals=True))
+    assert driven_m > before.driven_m
+    assert after.driven_m == pytest.approx(before.driven_m + session.drives.driven_m - driven_m)
+
+
+async def test_every_drive_of_an_exploration_is_counted_once(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    session = session_of(robot, tmp_path)
+    explorer = Explorer(session)
+    robot.n_to_fail = 1
+    states: list[ExplorationState] = []
+    while len(states) < 60 and (not states or not states[-1].is_end or len(states) == 2):
+        progress = await explorer.advance(None, wait_s=1.5, on_trip=_tell_nobody)
+        if states:
+            ended = progress.n_arrived + progress.n_seen + progress.n_blocked + progress.n_ended
+            assert progress.n_goals == ended + (progress.trip is not None)
+        states.append(progress.state)
+        if len(states) == 1:
+            await session.drives.stop()
+    assert ExplorationState.INTERRUPTED in states
+    assert states[-1] is ExplorationState.NOTHING_LEFT
+
+
+async def test_a_share_that_is_reached_says_what_it_leaves(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    progress = await _explore(Explorer(session_of(robot, tmp_path)), Bounds(known_ratio=0.05))
+    assert progress.bound is BoundKind.KNOWN
+    best = max(progress.frontiers, key=lambda each: each.gain_m2)
+    assert f"{best.id}" in say_progress(progress)
+    assert "Left:" in say_progress(progress)

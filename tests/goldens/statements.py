@@ -235,7 +235,7 @@ def _check_frontiers(
     heading, rows = _named(tables, "Frontiers")
     known = {each.id: each for each in world.frontiers.frontiers}
     for row in rows:
-        name, at = row["id"], _point(row["go to x, y, yaw"])
+        name, at = row["id"], _point(row["go to x, y"])
         yield f"{name} is a frontier", name in known
         yield (
             f"path to {name}: {row['path m']}",

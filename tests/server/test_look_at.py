@@ -87,7 +87,7 @@ async def test_a_remembered_thing_is_faced_and_its_column_is_told(tmp_path: Path
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         await note_fridge(client)
         told = text_of(await client.call_tool("look_at", {"place": "fridge"}))
-    assert "of the area where T1 may be" in told
+    assert "All of where T1 may be is in view." in told
     assert 10 <= columns(told)["T1"][0] <= 54
     assert "write_semantic_data notes it from this picture" in told
 

@@ -32,9 +32,9 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     callback=_split,
     default="scripted",
     show_default=True,
-    help="Who answers, comma-separated: scripted, near-sighted, blind, oracle, random, "
-    "nearest-frontier, paper-loop, mock, PROVIDER/MODEL for a model, command:PROGRAM for a client "
-    "program.",
+    help="Who answers, comma-separated: scripted, near-sighted, bearings, blind, oracle, "
+    "random, nearest-frontier, paper-loop, mock, PROVIDER/MODEL for a model, command:PROGRAM for a "
+    "client program.",
 )
 @click.option(
     "--task",

@@ -55,3 +55,14 @@ async def test_a_search_is_not_begun_where_none_is_offered(tmp_path: Path) -> No
 async def test_a_search_is_begun_where_one_is_offered(tmp_path: Path) -> None:
     _, ledger = await run(tmp_path, "search_for")
     assert "search_for" in {call.tool for call in ledger.made}
+
+
+async def test_a_script_without_ranges_notes_directions_alone(tmp_path: Path) -> None:
+    robot = FakeRobot(grid_from_text(ROOM, resolution_m=0.5), pose=Pose(1.8, 1.2))
+    async with connect(robot, tmp_path) as client:
+        ledger = Hearing()
+        driver = ToolDriver(ToolClient(client, ledger), tells_ranges=False)
+        await driver.record(driver.note("- fire extinguisher, +3 deg, 1.2 m"))
+    (written,) = [call for call in ledger.made if call.tool == "write_semantic_data"]
+    (landmark,) = written.arguments["safety_landmarks"]
+    assert landmark == {"label": "fire extinguisher", "bearing_deg": 3.0}

@@ -72,6 +72,7 @@ class Explorer:
         self._bounds = Bounds()
         self._paused_at: Point | None = None
         self._elapsed_s = 0.0
+        self._told_ratio: float | None = None
 
     @property
     def is_going_on(self) -> bool:
@@ -95,6 +96,7 @@ class Explorer:
         if not self.is_going_on:
             self._trips.begin_count()
             self._paused_at, self._elapsed_s, self._bounds = None, 0.0, Bounds()
+            self._told_ratio = None
         self._bounds = bounds or self._bounds
         async with self._trips.given_up_with_call():
             return await self._advance(wait_s, on_trip, client)
@@ -245,6 +247,7 @@ class Explorer:
         return await self._site.compute(lambda: self._report(world, bound, seen_id))
 
     def _report(self, world: WorldModel, bound: BoundKind | None, seen_id: str | None) -> Progress:
+        told_ratio, self._told_ratio = self._told_ratio, known_ratio(world)
         return Progress(
             state=self._state,
             bounds=self._bounds,
@@ -255,10 +258,12 @@ class Explorer:
             n_arrived=self._trips.n_arrived,
             n_seen=self._trips.n_seen,
             n_blocked=self._trips.n_blocked,
+            n_ended=self._trips.n_ended,
             driven_m=self._trips.driven_m,
             elapsed_s=self._elapsed_s,
             known_area_m2=known_area_m2(world),
-            known_ratio=known_ratio(world),
+            known_ratio=self._told_ratio,
+            told_ratio=told_ratio,
             frontiers=world.frontiers.frontiers,
             trip=self._trips.current,
             pose=world.robot,

@@ -84,8 +84,10 @@ class Progress:
         seen_id: The frontier seen from here, where it pauses for that.
         trip_end: What interrupted it; None where that is not known.
         n_seen: How many it left on the way, since what they were for had been seen from afar.
+        n_ended: How many were cancelled, or ended by a stop or another goal.
         elapsed_s: Robot time of all calls.
         known_ratio: Of the free floor that is to be expected in all.
+        told_ratio: What the answer before told of that; None in the first one.
         frontiers: Where one could still go, best first.
         pose_doubt: Why it may be elsewhere.
         pictured_ratio: Of the walls in sight of the floor in reach, the share that pictures show;
@@ -101,10 +103,12 @@ class Progress:
     n_arrived: int
     n_seen: int
     n_blocked: int
+    n_ended: int
     driven_m: float
     elapsed_s: float
     known_area_m2: float
     known_ratio: float
+    told_ratio: float | None
     frontiers: tuple[Frontier, ...]
     trip: Trip | None
     pose: Pose

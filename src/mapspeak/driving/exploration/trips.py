@@ -115,6 +115,7 @@ class Trips:
     Attributes:
         current: The trip under way; None between two.
         n_seen: How many were left on the way, since what they were for had been seen from afar.
+        n_ended: How many were cancelled, or ended by a stop or another goal.
         end: Why the latest trip ended before its target; None when it did not.
     """
 
@@ -122,19 +123,27 @@ class Trips:
         self._site = site
         self.current: Trip | None = None
         self.blocked = BlockedPlaces()
-        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
+        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = self.n_ended = 0
         self.end: TripEnd | None = None
-        self._driven_before_m = 0.0
+        self._ended_m = self._begun_at_m = 0.0
 
     @property
     def driven_m(self) -> float:
-        """How far the robot has come, also between two calls, by its own poses."""
-        return self._site.drives.driven_m - self._driven_before_m
+        """How far the robot has come on trips, by its own poses; not on drives of others."""
+        return self._ended_m + (0.0 if self.current is None else self._count_under_way())
+
+    def _count_under_way(self) -> float:
+        return self._site.drives.driven_m - self._begun_at_m
+
+    def _leave(self) -> Trip | None:
+        """Count the metres of the trip under way, if there is one, and take it for ended."""
+        self._ended_m, trip, self.current = self.driven_m, self.current, None
+        return trip
 
     def begin_count(self) -> None:
         """Count trips and metres from zero again; what was blocked stays remembered."""
-        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
-        self._driven_before_m = self._site.drives.driven_m
+        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = self.n_ended = 0
+        self._ended_m, self._begun_at_m = 0.0, self._site.drives.driven_m
 
     async def set_out(
         self, target: Target, *, ticket: int, client: str, grid: OccupancyGrid
@@ -153,7 +162,8 @@ class Trips:
             )
         except GoalError as error:
             return self._take_in_refusal(target, error.message, ticket=ticket, grid=grid)
-        self.n_seen += self.current is not None
+        self.n_seen += self._leave() is not None
+        self._begun_at_m = self._site.drives.driven_m
         self.current = Trip(target, drive.goal_id)
         self.n_begun += 1
         return TripState.UNDER_WAY
@@ -189,17 +199,21 @@ class Trips:
 
     async def give_up(self, *, is_seen: bool = False) -> None:
         """Bring the robot to a stand, where it is on a trip."""
-        trip, self.current = self.current, None
+        trip = self.current
         if trip is not None:
             self.n_seen += is_seen
-            with anyio.CancelScope(shield=True):
-                await self._site.drives.cancel(trip.goal_id)
+            self.n_ended += not is_seen
+            try:
+                with anyio.CancelScope(shield=True):
+                    await self._site.drives.cancel(trip.goal_id)
+            finally:
+                self._leave()
 
     def _take_in(self, trip: Trip, report: DriveReport, grid: OccupancyGrid) -> TripState:
         status = report.status
         if not status.state.is_final:
             return TripState.UNDER_WAY
-        self.current = None
+        self._leave()
         if status.state is GoalState.ARRIVED:
             self.end = None
             self.n_arrived += 1
@@ -210,6 +224,7 @@ class Trips:
             return TripState.REPLACED
         self.end = TripEnd(goal_id=trip.goal_id, goal_state=status.state, cause=status.cause)
         if status.state in (GoalState.CANCELLED, GoalState.PREEMPTED):
+            self.n_ended += 1
             return TripState.INTERRUPTED
         self.n_blocked += 1
         self._remember_blocked(trip.target, self.end, report.pose, grid)
@@ -228,7 +243,7 @@ class Trips:
         """Take a refusal for one of the place, unless another client drives the robot now."""
         self.end = TripEnd(cause=Cause(code=CauseCode.REFUSED, quote=why))
         if self._is_not_ours(ticket):
-            self.current = None
+            self.n_ended += self._leave() is not None
             return TripState.INTERRUPTED
         self._remember_blocked(target, self.end, target.pose, grid)
         return TripState.BLOCKED

@@ -43,7 +43,7 @@ class Row:
 
     def goal(self) -> Point:
         """Return where a frontier's row says to go."""
-        x, y = self.cells["go to x, y, yaw"].split(",")[:2]
+        x, y = self.cells["go to x, y"].split(",")[:2]
         return Point(float(x), float(y))
 
 
@@ -182,11 +182,13 @@ class ToolDriver:
     Attributes:
         wait_s: Longest wait of each call for the end of a drive, in robot time.
         sight_m: Range up to which it uses the detector's reports; 0 for a blind one.
+        tells_ranges: It records how far things are; else in which direction alone.
     """
 
     tools: ToolClient
     wait_s: float = WAIT_S
     sight_m: float = math.inf
+    tells_ranges: bool = True
     _n_views: int = 0
 
     async def is_offered(self, tool: str) -> bool:
@@ -255,6 +257,9 @@ class ToolDriver:
         self._n_views += 1
         place = (await self.tools.demand("get_robot_pose")).report["place"]
         record = describe_view(self._n_views, place, sightings)
+        if not self.tells_ranges:
+            for thing in (*record["safety_landmarks"], *record["functional_landmarks"]):
+                del thing["range_m"]
         await self.tools.demand("write_semantic_data", **record, **taken_at)
 
     async def record_around(self) -> None:

@@ -22,7 +22,7 @@ from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.installation import say_install
 
-ORACLE, MOCK = "oracle", "mock"
+ORACLE, MOCK, BEARINGS = "oracle", "mock", "bearings"
 COMMAND = "command:"
 NEAR_SIGHT_M = 2.0
 """Range of sight of the near-sighted script; things are visible from three times as far."""
@@ -34,6 +34,7 @@ SCRIPTS: dict[str, Work] = {
     "scripted": follow_script,
     "near-sighted": partial(follow_script, sight_m=NEAR_SIGHT_M),
     "blind": partial(follow_script, sight_m=0.0),
+    BEARINGS: partial(follow_script, tells_ranges=False),
     "random": answer_at_random,
     "nearest-frontier": explore_nearest_frontiers,
     "paper-loop": follow_paper,

@@ -41,14 +41,20 @@ Deed = Callable[[ToolDriver, re.Match[str]], Awaitable[AgentEnd]]
 
 
 async def follow_script(
-    task: Assignment, tools: ToolClient, *, sight_m: float = math.inf
+    task: Assignment,
+    tools: ToolClient,
+    *,
+    sight_m: float = math.inf,
+    tells_ranges: bool = True,
 ) -> AgentEnd:
     """Read the prompt by its words and do what fits.
 
     Args:
         sight_m: Range up to which it uses the detector's reports; it reads all text.
+        tells_ranges: It records how far things are, and checks what one look has shown; else it
+            records directions alone, and takes the first drive to a thing for the last.
     """
-    driver = ToolDriver(tools, sight_m=sight_m)
+    driver = ToolDriver(tools, sight_m=sight_m, tells_ranges=tells_ranges)
     try:
         for pattern, deed in DEEDS:
             match = re.search(pattern, task.prompt)
@@ -145,6 +151,8 @@ async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> Agen
 
 async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
     """Drive up to the nearest remembered one; what one look has shown is checked."""
+    if not driver.tells_ranges:
+        return AgentEnd(answer=f"It {await driver.drive(place=f'nearest {label}')}.")
     for thing in (await driver.find_things(label))[:MOST_TRIED]:
         if await driver.drive(place=thing["id"]) != ARRIVED:
             continue
@@ -276,7 +284,7 @@ async def _say_where_to_explore(driver: ToolDriver) -> AgentEnd:
     frontiers = (await driver.look()).rows("Frontiers")
     if not frontiers:
         return gave_up(UNTOLD)
-    x, y, *_ = frontiers[0].cells["go to x, y, yaw"].split(", ")
+    x, y, *_ = frontiers[0].cells["go to x, y"].split(", ")
     return _answer(f"{x}, {y}")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.finding import can_think, find_versions, read_thinking
+from mapspeak.evaluation.agents.finding import BEARINGS, can_think, find_versions, read_thinking
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import EXPLORE, choose_tasks, find_task
 from mapspeak.evaluation.tasks.task import Task
@@ -146,12 +146,15 @@ def _trials_of(options: RunOptions, task: Task, world: str) -> Iterator[Trial]:
 
 
 def prepare_world(options: RunOptions, world: str) -> Trial:
-    """Return the exploration whose map and memory all trials of a world start from."""
+    """Return the exploration whose map and memory all trials of a world start from.
+
+    The script does it, unless what is asked for is the memory of the script without ranges.
+    """
     return Trial(
         task=EXPLORE,
         world=world,
         seed=options.seed,
-        agent=SCRIPTED,
+        agent=BEARINGS if set(options.agents) == {BEARINGS} else SCRIPTED,
         representation=PLAIN,
         number=1,
     )

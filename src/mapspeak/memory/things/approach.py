@@ -87,7 +87,10 @@ def find_overlook(
     """
     middle = np.median(whereabouts, axis=0)
     off_m = np.hypot(*(np.median(stands[:, None] - whereabouts, axis=1)).T)
-    near = np.flatnonzero(np.hypot(*(stands - middle).T) <= OVERLOOK_FAR_M)
+    away_m = np.hypot(*(stands - middle).T)
+    # From farther than it was seen already nothing more is seen of it.
+    seen_m = min((math.dist((at.x, at.y), middle) for at in seen_from), default=OVERLOOK_FAR_M)
+    near = np.flatnonzero(away_m <= min(seen_m, OVERLOOK_FAR_M))
     if not near.size:
         return None
     stands, ways_m, off_m = stands[near], ways_m[near], off_m[near]

@@ -97,8 +97,8 @@ def measure_shown(
 ) -> float | None:
     """Return the share of a place that a picture shows.
 
-    Of a room it is that of its floor; of a thing, that of where it may be; of a door or a point 1
-    or 0. None for other places.
+    Of a room it is that of its floor; of a thing, that of the places where it may be; of a door or
+    a point 1 or 0. None for other places.
     """
     match place.thing:
         case Region() as region:
@@ -109,7 +109,14 @@ def measure_shown(
             whole_m2 = max(n_cells, 1) * world.grid.resolution_m * world.grid.resolution_m
             return min(float(shown_m2[0, heading_index(pose.yaw_rad)]) / whole_m2, 1.0)
         case RememberedThing() as remembered if remembered.thing.position is not None:
-            return world.measure_faced(remembered)
+            whereabouts = remembered.thing.whereabouts
+            if whereabouts is None:
+                whereabouts = np.array([[remembered.thing.position.x, remembered.thing.position.y]])
+            shown = [
+                _shows(world, pose, Point(x, y), half_view_rad, own_m=OWN_THING_M)
+                for x, y in whereabouts.tolist()
+            ]
+            return sum(shown) / len(shown)
         case Door(place=point) | Spot(point=point):
             return float(_shows(world, pose, point, half_view_rad, own_m=OWN_DOOR_M))
         case _:

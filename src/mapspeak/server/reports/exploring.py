@@ -1,11 +1,12 @@
 """What the model reads while the robot explores or searches by itself."""
 
+from collections.abc import Sequence
 from typing import Self
 
 from pydantic import Field
 
-from mapspeak.driving.exploration.progress import ExplorationState, Progress
-from mapspeak.driving.search.progress import SearchProgress, SearchState
+from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
+from mapspeak.driving.search.progress import SearchProgress, SearchState, SeenRegion
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.drives import (
     say_blocked,
@@ -20,11 +21,12 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose_doubt
 
 MOST_NAMED = 8
+WHOLE_RATIO = 0.9
 
 NEXT_STEP = {
     ExplorationState.DRIVING: "Call {explore} again to go on. {stop_robot} ends it.",
     ExplorationState.AT_GOAL: "Look at the picture, record what matters, call {explore} to go on.",
-    ExplorationState.BOUND_REACHED: "Call {explore} again for more.",
+    ExplorationState.BOUND_REACHED: "Call {explore} again to go on as far again.",
     ExplorationState.NOTHING_LEFT: "The map is complete. Call {look_at_map}.",
     ExplorationState.REST_UNREACHABLE: (
         "All that can be reached is known. Open what is in the way, or wait until it is no longer "
@@ -36,16 +38,25 @@ NEXT_STEP = {
     ),
 }
 
+RAISE_BOUND = (
+    "A room may lie behind any frontier that is left: call {explore} with a higher known_percent, "
+    "or without it, to see the rest. With the same bound it ends at once."
+)
+
 
 class ExploreAnswer(Report):
     """How an exploration stands."""
 
     state: ExplorationState = Field(description="driving and at_goal go on with the next call")
     reason: str
-    n_goals: int = Field(description="frontiers it set out to")
+    n_goals: int = Field(
+        description="frontiers it set out to: n_arrived, n_seen, n_blocked, n_ended and the one "
+        "under way"
+    )
     n_arrived: int
     n_seen: int = Field(description="left on the way: seen from afar")
     n_blocked: int
+    n_ended: int = Field(description="cancelled, or ended by a stop or another goal")
     driven_m: float
     elapsed_s: float = Field(description="robot time of all calls of this exploration")
     known_area_m2: float = Field(description="free floor on the map")
@@ -71,6 +82,7 @@ class ExploreAnswer(Report):
             n_arrived=progress.n_arrived,
             n_seen=progress.n_seen,
             n_blocked=progress.n_blocked,
+            n_ended=progress.n_ended,
             driven_m=round(progress.driven_m, 1),
             elapsed_s=round(progress.elapsed_s, 1),
             known_area_m2=round(progress.known_area_m2, 1),
@@ -83,8 +95,14 @@ class ExploreAnswer(Report):
             robot=PoseReport.of(progress.pose),
             pose_uncertain=say_pose_doubt(progress.pose_doubt),
             cannot_reach=_say_rest(progress),
-            next_step=lead(NEXT_STEP[progress.state]),
+            next_step=lead(_find_next_step(progress)),
         )
+
+
+def _find_next_step(progress: Progress) -> str:
+    if progress.bound is BoundKind.KNOWN:
+        return RAISE_BOUND if progress.frontiers else "No frontier is left. Call {look_at_map}."
+    return NEXT_STEP[progress.state]
 
 
 def _percent(ratio: float | None) -> float | None:
@@ -105,6 +123,16 @@ def _say_rest(progress: Progress) -> list[str]:
     ]
     left_out = len(told) - MOST_NAMED
     return told if left_out <= 0 else [*told[:MOST_NAMED], f"and {left_out} more"]
+
+
+def _say_seen(regions: Sequence[SeenRegion]) -> list[str]:
+    """Say how much of rooms was seen: of those that were not seen as good as whole."""
+    partly = [each for each in regions if each.seen_ratio < WHOLE_RATIO]
+    partly.sort(key=lambda each: each.seen_ratio)
+    told = [f"{each.id} {100 * each.seen_ratio:.0f} %" for each in partly[:MOST_NAMED]]
+    n_more, n_whole = len(partly) - len(told), len(regions) - len(partly)
+    told += [f"and {n_more} more in part"] if n_more else []
+    return [*told, f"{n_whole} at least {WHOLE_RATIO:.0%}"] if n_whole else told
 
 
 SEARCH_STEP = {
@@ -131,7 +159,7 @@ class SearchAnswer(Report):
     goal_id: str | None
     next: list[str] = Field(description="where it could look next, best first; F ids take scores")
     seen_percent: float = Field(description="of the known floor, by the camera from near")
-    places_seen: list[str] = Field(description="in the end: how much of each room was seen")
+    places_seen: list[str] = Field(description="in the end: of each room, the least seen first")
     cannot_reach: list[str]
     robot: PoseReport
     pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
@@ -151,9 +179,7 @@ class SearchAnswer(Report):
             goal_id=standing.goal_id,
             next=[say_candidate(candidate) for candidate in standing.next],
             seen_percent=round(100 * standing.seen_ratio, 1),
-            places_seen=[
-                f"{region.id} {100 * region.seen_ratio:.0f} %" for region in standing.regions
-            ],
+            places_seen=_say_seen(standing.regions),
             cannot_reach=[say_blocked(place) for place in standing.blocked][:MOST_NAMED],
             robot=PoseReport.of(standing.pose),
             pose_uncertain=say_pose_doubt(standing.pose_doubt),

@@ -36,6 +36,7 @@ from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 MOST_THINGS = 20
 MOST_VIEWS = 12
 LOW_RATIO = 0.5
+ALL_RATIO = 0.995
 MOST_SIGHTS = 12
 CHECK = (
     "Is it there? {write_semantic_data} notes it from this picture; "
@@ -342,7 +343,9 @@ def _say_shown(place: Place, shown_ratio: float | None) -> str:
         case Region():
             return f"{shown_ratio:.0%} of the floor of {place.name} is in view."
         case RememberedThing(id=thing_id):
-            return f"The picture covers {shown_ratio:.0%} of the area where {thing_id} may be."
+            if shown_ratio >= ALL_RATIO:
+                return f"All of where {thing_id} may be is in view."
+            return f"{shown_ratio:.0%} of the area where {thing_id} may be is in view."
         case Door():
             return f"{place.name} is {'' if shown_ratio else 'NOT '}in view."
         case _:

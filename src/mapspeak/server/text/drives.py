@@ -159,9 +159,19 @@ EXPLORATION_STATES = {
 
 
 def say_progress(progress: Progress) -> str:
-    """Say why a call of an exploration ended as it did."""
+    """Say why a call of an exploration ended as it did, and why the known share fell if it did."""
+    told, known = progress.told_ratio, progress.known_ratio
+    if told is None or round(100 * known) >= round(100 * told):
+        return _say_progress(progress)
+    return (
+        f"{_say_progress(progress)} More floor can be expected than before, so that less of it "
+        f"is known: {100 * known:.0f} %, {100 * told:.0f} % before."
+    )
+
+
+def _say_progress(progress: Progress) -> str:
     if progress.seen_id is not None:
-        return f"Most of what {progress.seen_id} promised has been seen from here."
+        return _say_seen(progress.seen_id, progress)
     match progress.state:
         case ExplorationState.BOUND_REACHED:
             return _say_bound(progress)
@@ -174,7 +184,33 @@ def say_progress(progress: Progress) -> str:
     return EXPLORATION_STATES[progress.state]
 
 
+def _say_seen(seen_id: str, progress: Progress) -> str:
+    """Say that a frontier was seen from afar, and what is left there where it is still one."""
+    said = f"Most of what {seen_id} promised has been seen from here"
+    left = next((each for each in progress.frontiers if each.id == seen_id), None)
+    return f"{said}." if left is None else f"{said}; about {left.gain_m2:.1f} m2 are left."
+
+
+def _say_left(progress: Progress) -> str:
+    """Say what a bound leaves: how many frontiers, and the largest of them."""
+    if not progress.frontiers:
+        return ""
+    most = max(progress.frontiers, key=lambda each: each.gain_m2)
+    total_m2 = sum(each.gain_m2 for each in progress.frontiers)
+    if len(progress.frontiers) == 1:
+        return f" Left: {most.id}, with about {total_m2:.1f} m2 to see."
+    return (
+        f" Left: {len(progress.frontiers)} frontiers with about {total_m2:.1f} m2 to see, most at "
+        f"{most.id} ({most.gain_m2:.1f} m2)."
+    )
+
+
 def _say_bound(progress: Progress) -> str:
+    """Say which bound was reached, and what it leaves."""
+    return f"{_say_reached(progress)}{_say_left(progress)}"
+
+
+def _say_reached(progress: Progress) -> str:
     match progress.bound:
         case BoundKind.DURATION:
             return f"{progress.bounds.duration_s:.0f} s have passed."
@@ -185,9 +221,10 @@ def _say_bound(progress: Progress) -> str:
                 f"{bound_percent:.0f} %."
             )
     goals = "goal was" if progress.n_goals == 1 else "goals were"
+    ended = f", {progress.n_ended} ended from outside" if progress.n_ended else ""
     return (
         f"{progress.n_goals} {goals} tried: {progress.n_arrived} reached, {progress.n_seen} seen "
-        f"from afar, {progress.n_blocked} blocked."
+        f"from afar, {progress.n_blocked} blocked{ended}."
     )
 
 

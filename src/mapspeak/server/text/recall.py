@@ -16,6 +16,8 @@ from mapspeak.worldmodel.recollection import RememberedPlace
 LONGEST_QUOTE = 120
 MOST_LEFT_NAMED = 100
 LOOK_FOR = "Look for it with {search_for}."
+OTHERWISE = "Else see why the others are listed, or say it in other words."
+LOOK_FOR_REST = "What is not remembered {search_for} finds."
 LOOK_AGAIN = (
     "Look again on arrival: the robot stops where most of the places where it may be are in view. "
     "{write_semantic_data} with its column in that picture places it; then drive on."
@@ -153,13 +155,18 @@ def _say_several(answer: Answer, first: RecallCandidate) -> str:
 def _say_unsure(answer: Answer, first: RecallCandidate) -> str:
     kind = f" (it is more like {quote(answer.missing)})" if answer.missing else ""
     n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
-    of_several = f", of {n_same} the nearest by path" if n_same > 1 else ""
-    said = (
-        f"Unsure: nothing is called so{kind}. The likeliest is {_name(first)}{of_several}; what "
-        "is meant may also not be remembered. See why each is listed, and take an id only if it "
-        "fits; else say it in other words."
+    path_m = first.check.path_m
+    facts = (
+        f"of {n_same} the nearest by path" if n_same > 1 else "",
+        "" if path_m is None else f"{path_m:.1f} m away",
     )
-    return " ".join(filter(None, (said, lead(LOOK_FOR))))
+    where = ", ".join(filter(None, facts))
+    said = (
+        f"Unsure: nothing is called so{kind}. The likeliest is {_name(first)}"
+        f"{f' ({where})' if where else ''}: if that is meant,"
+    )
+    take = lead("{navigate_to} takes {id}.", id=first.id) or f"take {first.id}."
+    return " ".join(filter(None, (said, take, OTHERWISE, lead(LOOK_FOR_REST))))
 
 
 def _name(candidate: RecallCandidate) -> str:

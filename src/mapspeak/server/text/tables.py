@@ -86,10 +86,10 @@ def _summary(view: MapView, told: Told) -> str:
     world, look = view.world, view.look
     room_id = world.find_room_id(world.robot.point) or "no room"
     explored = f"{known_area_m2(world):.1f} m2 of free floor, {100 * known_ratio(world):.0f} %"
-    width = f", {2 * world.radius_m:.2f} m wide" if told.is_first else ""
+    width = f" It is {2 * world.radius_m:.2f} m wide." if told.is_first else ""
     lines = [
         *say_warnings(world),
-        f"Robot: {say_pose(world.robot)}, in {room_id}{width}.",
+        f"Robot: {say_pose(world.robot)}, in {room_id}.{width}",
         f"Explored: {explored} of what is expected. {say_verdict(world.frontiers)}",
     ]
     if Layer.ROOMS in look.layers:
@@ -174,7 +174,7 @@ def _frontier_table(view: MapView, told: Told) -> str:
     shown = part.items if told.is_first else choose_frontiers(part.items, FRONTIERS_AGAIN)
     table = build_table(
         "Frontiers to the unknown, best first" if told.is_first else "Frontiers, best first",
-        ("id", "go to x, y, yaw", "new m2, about", WAY, "in", "why"),
+        ("id", "go to x, y", "new m2, about", WAY, "in", "why"),
         shown,
         lambda frontier: _frontier_row(view.world, frontier),
         n_all=part.n_all,
@@ -195,13 +195,12 @@ def _say_extremes(view: MapView) -> Iterator[str]:
 
 
 def _frontier_row(world: WorldModel, frontier: Frontier) -> Sequence[str]:
-    pose = frontier.pose
     return (
         frontier.id,
-        f"{say_point(pose.point)}, {pose.yaw_deg + 0.0:.0f} deg",
+        say_point(frontier.pose.point),
         f"{frontier.gain_m2:.1f}",
         f"{frontier.distance_m:.1f}",
-        world.find_room_id(pose.point) or "-",
+        world.find_room_id(frontier.pose.point) or "-",
         say_merits(frontier),
     )
 
