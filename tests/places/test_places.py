@@ -264,3 +264,26 @@ def test_how_far_the_nearest_is_and_of_how_many_is_told() -> None:
 def test_more_things_than_there_are_is_an_error(words: str) -> None:
     with pytest.raises(GoalError, match="can be reached"):
         find_places(world_of_chargers(), words)
+
+
+BEHIND_A_SLOT = """
+    ####################
+    #..........#.......#
+    #..........#.......#
+    #..................#
+    #..........#.......#
+    #..........#.......#
+    ####################
+    """
+
+
+def test_a_thing_that_cannot_be_come_near_to_is_gone_to_as_near_as_it_is_in_sight() -> None:
+    grid = grid_from_text(BEHIND_A_SLOT, resolution_m=0.5)
+    station = Landmark(label="charging station", bearing_rad=0.0, range_m=8.5)
+    seen = Waypoint(name="far end", pose=Pose(0.75, 1.75, 0.0), functional_landmarks=(station,))
+    world = WorldModel(grid, seen.pose, SemanticMap(waypoints=(seen,)), radius_m=0.6)
+    goal = check_place(world, find_place(world, "charging station"))
+    assert goal.check.is_ok
+    assert goal.pose.x > 3.5
+    assert abs(goal.pose.yaw_rad) < 0.3
+    assert "the nearest place in sight of it" in goal.place.reason

@@ -32,6 +32,9 @@ async def test_what_is_written_at_a_place_is_recalled_with_the_pose(
     assert place["pose"] == {"x": 1.5, "y": 1.4, "yaw_deg": 0.0}
     assert place["safety_landmarks"][0]["label"] == "fire extinguisher"
     assert place["functional_landmarks"][0]["bearing_deg"] == 20.0
+    extinguisher, sink = written["things"]
+    assert extinguisher == 'T1 "fire extinguisher", nobody noted where'
+    assert sink.startswith('T2 "sink" at (')
 
 
 async def test_an_existing_name_is_updated_not_doubled(tmp_path: Path) -> None:

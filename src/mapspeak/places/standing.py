@@ -1,6 +1,7 @@
 """Where and how a robot stands when it is sent to a place."""
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
-from mapspeak.spatial.viewing import HALF_VIEW_RAD, floor_by_heading, heading_rad
+from mapspeak.spatial.viewing import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
 from mapspeak.worldmodel.model import WorldModel, find_crossing
 from mapspeak.worldmodel.recollection import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision
@@ -20,6 +21,8 @@ EVERY_M = 1.0
 """Places to look from are this far from each other."""
 NARROW_COMFORT_M = 0.1
 """What it should have at least where many places are compared."""
+OWN_M = 0.6
+"""So near to a thing nothing hides it but itself, or the wall that it hangs on."""
 COMFORT_M = 0.15
 """How much more than its radius a robot should have around it where it is sent to stand."""
 
@@ -132,12 +135,13 @@ def arrival_pose(world: WorldModel, point: Point) -> Pose:
 
 
 def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
-    """Return the pose that faces a thing from near, else one that it was seen from.
+    """Return the pose that faces a thing from near, else from where it is in sight.
 
     A thing that is not known well enough for that is looked for from where most of the places where
-    it may be are in view.
+    it may be are in view; one that cannot be come near to, from the nearest place in sight of it.
     """
     near = find_overlook_of(world, remembered) or world.find_approach(remembered)
+    near = near or find_stand_off(world, remembered)
     if near is not None:
         return near
     thing = remembered.thing
@@ -147,6 +151,24 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
     if thing.position is None or thing.position == pose.point:
         return pose
     return Pose(pose.x, pose.y, pose.point.bearing_to(thing.position))
+
+
+def find_stand_off(world: WorldModel, remembered: RememberedThing) -> Pose | None:
+    """Return the nearest place in sight of a thing; None where it was seen from none farther."""
+    target = remembered.thing.position
+    if target is None:
+        return None
+    seen_m = min(
+        (view.place.distance_to(target) for view in remembered.thing.supporting), default=math.inf
+    )
+    stands, _ = spread_places(world)
+    away_m = np.hypot(stands[:, 0] - target.x, stands[:, 1] - target.y)
+    for index in np.argsort(away_m, kind="stable")[: np.count_nonzero(away_m < seen_m)]:
+        x, y = stands[index].tolist()
+        stand = Point(x, y)
+        if is_in_sight(world.grid, stand, target, own_m=OWN_M):
+            return Pose(x, y, stand.bearing_to(target))
+    return None
 
 
 def find_overlook_of(world: WorldModel, remembered: RememberedThing) -> Pose | None:

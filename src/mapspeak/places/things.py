@@ -15,7 +15,7 @@ from mapspeak.places.naming import (
     find_named,
     say_spot,
 )
-from mapspeak.places.standing import stand_before
+from mapspeak.places.standing import find_stand_off, stand_before
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
@@ -135,11 +135,19 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
     else:
         said[0] += f" at {say_spot(thing.position)}, good to {thing.uncertainty_m:.1f} m"
         if world.find_approach(remembered) is None:
-            said.append("no floor near it can be reached, so the goal is where it was seen from")
+            said.append(
+                f"no floor near it can be reached, so the goal is {_say_goal(world, remembered)}"
+            )
     said.append(f"seen from {' '.join(find_place_ids(world, thing.waypoints))}")
     if thing.conflicting:
         said.append(f"{len(thing.conflicting)} of the places in sight of it say otherwise")
     return Place(name or remembered.id, remembered, "; ".join(said))
+
+
+def _say_goal(world: WorldModel, remembered: RememberedThing) -> str:
+    if find_stand_off(world, remembered) is None:
+        return "where it was seen from"
+    return "the nearest place in sight of it"
 
 
 def find_place_ids(world: WorldModel, names: Iterable[str]) -> list[str]:

@@ -309,6 +309,7 @@ class WriteAnswer(Report):
     is_new: bool
     replaced: str = Field(description="what was known of the place and reads otherwise now")
     landmarks: list[str] = Field(description="new, merged, kept or gone, and what changed")
+    things: list[str] = Field(description="by id, where they are")
     refused: list[str] = Field(description="what stays out, and why")
     n_places: int = Field(description="remembered in all")
     warnings: list[str]
@@ -321,6 +322,7 @@ class WriteAnswer(Report):
         *,
         merge: Merge,
         refused: Sequence[str],
+        things: Sequence[str] = (),
         warnings: Sequence[str] = (),
     ) -> Self:
         """Make the report of a write, with the id that the place has in the memory now."""
@@ -333,6 +335,7 @@ class WriteAnswer(Report):
             is_new=receipt.previous is None,
             replaced="; ".join(say_replaced(receipt.previous, merge.waypoint)),
             landmarks=list(say_landmarks(merge)),
+            things=list(things),
             refused=list(refused),
             n_places=len(memory.waypoints),
             warnings=list(warnings),

@@ -7,10 +7,12 @@ from mapspeak.memory.quoting import name_key, quote, quote_name
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.memory.store.forgetting import Forgotten
 from mapspeak.memory.things.approach import OVERLOOK_M
+from mapspeak.memory.things.thing import Thing
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
 from mapspeak.server.text.offered import lead
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
 LONGEST_QUOTE = 120
@@ -219,3 +221,18 @@ def say_gone(label: str, done: Forgotten | None, *, ids: Sequence[str], is_in_re
         meant = ", ".join(ids)
         return lead("{named} may be {meant}: {forget} takes the id.", named=named, meant=meant)
     return "" if is_in_record or done is not None else f"Nothing near by is remembered as {named}."
+
+
+def say_placed(world: WorldModel, name: str) -> list[str]:
+    """Say by id which things a place now speaks for, and where each is taken to be."""
+    return [
+        f"{each.id} {quote_name(each.thing.label)}{_say_whereabouts(each.thing)}"
+        for each in world.things
+        if name in each.thing.waypoints
+    ]
+
+
+def _say_whereabouts(thing: Thing) -> str:
+    if thing.position is None:
+        return ", nobody noted where"
+    return f" at {say_spot(thing.position)}, within {thing.uncertainty_m or 0.0:.1f} m"

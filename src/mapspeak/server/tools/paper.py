@@ -20,7 +20,7 @@ from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far
-from mapspeak.server.text.recall import say_advice, say_gone
+from mapspeak.server.text.recall import say_advice, say_gone, say_placed
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.annotating import Annotator, Landmarks
 from mapspeak.server.tools.sightings import fetch_ring
@@ -37,12 +37,12 @@ Name = Annotated[
     Field(description="as people say", min_length=1, max_length=120),
 ]
 Feature = Annotated[str, Field(max_length=300)]
-Description = Annotated[str, Field(description="in a sentence or two", max_length=2000)]
+Description = Annotated[str, Field(description="in two sentences", max_length=2000)]
 Safety = Annotated[Landmarks | None, Field(description="fixed safety equipment")]
 Functional = Annotated[Landmarks | None, Field(description="fixed things tasks need")]
 Features = Annotated[
     list[Feature] | None,
-    Field(max_length=50, description="lasting layout: walls, openings"),
+    Field(max_length=50, description="layout: walls, openings"),
 ]
 Gone = Annotated[list[Feature] | None, Field(max_length=50, description="labels no longer there")]
 X = Annotated[
@@ -54,6 +54,8 @@ Degrees = Annotated[float | None, Field(description="degrees", allow_inf_nan=Fal
 Query = Annotated[str | None, Field(description="or by what is there", max_length=200)]
 FromRow = Annotated[int, Field(description="row", ge=0)]
 WaypointName = Annotated[str | None, Field(description="one; else all")]
+MOST_JOINED = 500
+"""Of more places the things are not joined anew for the answer to a write: it would wait."""
 
 
 class PaperTools:
@@ -149,8 +151,15 @@ class PaperTools:
         far, moved = await self._say_far(receipt), await say_moved(session.compute(keeper.compare))
         far += await self._forget_gone(gone, merge, pose)
         places = await session.compute(memory.read)
-        told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
-        return WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
+        told = filter(None, (*far, unsure, kept.fault, moved))
+        return WriteAnswer.of(
+            receipt,
+            places,
+            merge=merge,
+            refused=annotator.refused,
+            things=await self._place_things(receipt.waypoint.name),
+            warnings=(*told,),
+        )
 
     @tool("Recall remembered places", ToolEffect.READS, has_report=True)
     async def get_semantic_data(
@@ -226,6 +235,16 @@ class PaperTools:
                 f"{high.x:.1f}, y {low.y:.1f} to {high.y:.1f}.",
                 hint="Give metres in the map frame, or leave x and y out for the robot's own pose.",
             )
+
+    async def _place_things(self, name: str) -> list[str]:
+        """Say where the things are that a place names; nothing where that takes long, or no map."""
+        try:
+            world = await self._session.fetch_world_model()
+        except (LinkError, MapError):
+            return []
+        if len(world.places) > MOST_JOINED:
+            return []
+        return await self._session.compute(partial(say_placed, world, name))
 
     async def _find_room_id(self, pose: Pose) -> str | None:
         try:
