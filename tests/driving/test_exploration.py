@@ -378,3 +378,18 @@ async def test_a_share_that_is_reached_says_what_it_leaves(tmp_path: Path) -> No
     best = max(progress.frontiers, key=lambda each: each.gain_m2)
     assert f"{best.id}" in say_progress(progress)
     assert "Left:" in say_progress(progress)
+
+
+async def test_a_share_that_is_reached_on_the_way_ends_it_before_the_next_frontier(
+    tmp_path: Path,
+) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    explorer, bounds = Explorer(session_of(robot, tmp_path)), Bounds(known_ratio=0.5)
+    progress = await explorer.advance(bounds, wait_s=0.5, on_trip=_tell_nobody)
+    n_goals = []
+    while not progress.state.is_end:
+        if progress.known_ratio >= 0.5:
+            n_goals.append(progress.n_goals)
+        progress = await explorer.advance(bounds, wait_s=0.5, on_trip=_tell_nobody)
+    assert progress.bound is BoundKind.KNOWN
+    assert {*n_goals, progress.n_goals} == {progress.n_goals}

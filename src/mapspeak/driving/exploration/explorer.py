@@ -108,7 +108,7 @@ class Explorer:
                 world = await self._site.fetch_world_model()
                 await self._look_on_the_way(world)
                 if (bound := self._bound_reached(world)) is not None:
-                    await self._trips.give_up()
+                    await self._trips.give_up(is_seen=bound is not BoundKind.DURATION)
                     return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
                 if (seen_id := self._find_seen_from_here(world)) is not None:
                     await self._trips.give_up(is_seen=True)
@@ -225,7 +225,8 @@ class Explorer:
         bounds = self._bounds
         if bounds.duration_s is not None and self._elapsed_s >= bounds.duration_s - SLACK_S:
             return BoundKind.DURATION
-        if self._trips.current is not None:
+        trip = self._trips.current
+        if trip is not None and not self._must_turn(world, trip.target):
             return None
         if bounds.n_goals is not None and self._trips.n_begun >= bounds.n_goals:
             return BoundKind.GOALS
