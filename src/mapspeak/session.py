@@ -109,20 +109,17 @@ class Session:
         self.robot: Robot = self._guarded or robot
         name_robot, lock = lambda: robot.description.name, threading.RLock()
         self.memory = FramedMemory(memory, name_robot=name_robot, lock=lock)
-        self.keeper = self.memory.keeper
         self.pictures, folder = PictureBook(), memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
         wall_clock = None if guard is None else guard.wall_clock
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
         self._rank: VectorRank | None = None
-        self._ranking = threading.Lock()
         self.recollector = Recollector(find_model, kept=folder)
-        self._tries = FrontierTries()
         self.drives = DriveBook(self.robot, when_busy=when_busy)
-        self._lease = Lease(lease_s)
+        self.keeper, self._lease = self.memory.keeper, Lease(lease_s)
         self.world: WorldModel | None = None
-        self._looked_s, self._learned_from = 0.0, ""
-        self._surveying = anyio.Lock()
+        self._tries, self._looked_s, self._learned_from = FrontierTries(), 0.0, ""
+        self._ranking, self._surveying = threading.Lock(), anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
         """Mark a client's call: its lease begins anew."""
@@ -167,17 +164,14 @@ class Session:
             recall = self._recall if needs_memory else self._recall_if_possible
             memory = await self.compute(partial(recall, grid))
             revision, warnings = await self._survey(grid)
-            if revision is not None and await self._learn(revision):
+            if await self._learn(revision):
                 revision, warnings = await self._survey(grid)
-            radius_m, at = self.robot.description.radius_m, stamped.pose.point
-            if revision is None:
-                revision = revise(grid, self.world, radius_m=radius_m)
-            await self.compute(partial(self._tries.learn, self.drives.ended, revision, at))
+            await self.compute(lambda: self._tries.learn(self.drives.ended, revision, stamped.pose))
             self.world = WorldModel(
                 grid,
                 stamped.pose,
                 replace(memory, warnings=(*memory.warnings, *warnings)),
-                radius_m=radius_m,
+                radius_m=self.robot.description.radius_m,
                 tried=self._tries.find_tried(revision),
                 previous=self.world,
                 revision=revision,
@@ -294,12 +288,12 @@ class Session:
         choose = partial(choose_goal, place=place, x=x, y=y, yaw_deg=yaw_deg, as_near=as_near)
         return await self.compute(partial(choose, world))
 
-    async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision | None, tuple[str, ...]]:
+    async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision, tuple[str, ...]]:
         """Return the map with what is closed on it now, and what is to be said of that."""
-        surveyor = self._surveyor
+        surveyor, radius_m = self._surveyor, self.robot.description.radius_m
         if surveyor is None:
-            return None, ()
-        revision = await surveyor.survey(grid, radius_m=self.robot.description.radius_m)
+            return revise(grid, self.world, radius_m=radius_m), ()
+        revision = await surveyor.survey(grid, radius_m=radius_m)
         others = () if self.guard is None else self.guard.warn_of_servers()
         return revision, (*others, *await self.compute(lambda: surveyor.describe(revision)))
 

@@ -46,16 +46,16 @@ def drive(goal_id: str, point: Point, state: GoalState, place: str = "F1") -> Dr
 
 def test_a_frontier_that_was_reached_stays_tried() -> None:
     tries, narrow = FrontierTries(), revision(gap_cells=6)
-    tries.learn([drive("G1", AHEAD, GoalState.ARRIVED)], narrow, ROBOT)
-    tries.learn([drive("G2", ROBOT, GoalState.ARRIVED)] * 100, narrow, ROBOT)
+    tries.learn([drive("G1", AHEAD, GoalState.ARRIVED)], narrow, Pose(ROBOT.x, ROBOT.y))
+    tries.learn([drive("G2", ROBOT, GoalState.ARRIVED)] * 100, narrow, Pose(ROBOT.x, ROBOT.y))
     assert tries.find_tried(narrow).looked_from == (AHEAD, ROBOT)
 
 
 def test_a_frontier_at_which_a_drive_failed_is_not_offered_until_the_map_there_changes() -> None:
     tries, narrow = FrontierTries(), revision(gap_cells=6)
-    tries.learn([drive("G1", AHEAD, GoalState.BLOCKED)], narrow, ROBOT)
+    tries.learn([drive("G1", AHEAD, GoalState.BLOCKED)], narrow, Pose(ROBOT.x, ROBOT.y))
     arrivals = [drive(f"G{number}", ROBOT, GoalState.ARRIVED) for number in range(2, 60)]
-    tries.learn(arrivals, narrow, ROBOT)
+    tries.learn(arrivals, narrow, Pose(ROBOT.x, ROBOT.y))
     assert tries.find_tried(narrow).failed_at == (AHEAD,)
     cells = narrow.grid.cells.copy()
     cells[10:18, 8:24] = -1
@@ -65,21 +65,21 @@ def test_a_frontier_at_which_a_drive_failed_is_not_offered_until_the_map_there_c
 
 def test_a_drive_that_found_no_way_through_a_gap_proves_it_too_narrow() -> None:
     tries, narrow = FrontierTries(), revision(gap_cells=6)
-    tries.learn([drive("G1", BEHIND_THE_GAP, GoalState.BLOCKED)], narrow, ROBOT)
+    tries.learn([drive("G1", BEHIND_THE_GAP, GoalState.BLOCKED)], narrow, Pose(ROBOT.x, ROBOT.y))
     (gap,) = tries.find_tried(narrow).gaps
     assert gap.point.distance_to(GAP) < 0.4
-    tries.learn([drive("G2", Point(4.55, 1.35), GoalState.BLOCKED)], narrow, ROBOT)
+    tries.learn([drive("G2", Point(4.55, 1.35), GoalState.BLOCKED)], narrow, Pose(ROBOT.x, ROBOT.y))
     assert len(tries.find_tried(narrow).gaps) == 1
 
 
 def test_a_drive_that_is_blocked_on_a_roomy_way_proves_no_gap() -> None:
     tries, wide = FrontierTries(), revision(gap_cells=11)
-    tries.learn([drive("G1", BEHIND_THE_GAP, GoalState.BLOCKED)], wide, ROBOT)
+    tries.learn([drive("G1", BEHIND_THE_GAP, GoalState.BLOCKED)], wide, Pose(ROBOT.x, ROBOT.y))
     assert not tries.find_tried(wide).gaps
 
 
 def test_a_cancelled_drive_shows_nothing() -> None:
     tries, narrow = FrontierTries(), revision(gap_cells=6)
-    tries.learn([drive("G1", BEHIND_THE_GAP, GoalState.CANCELLED)], narrow, ROBOT)
+    tries.learn([drive("G1", BEHIND_THE_GAP, GoalState.CANCELLED)], narrow, Pose(ROBOT.x, ROBOT.y))
     tried = tries.find_tried(narrow)
     assert tried == NOTHING_TRIED

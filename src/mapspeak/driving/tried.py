@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from mapspeak.driving.drivereport import FAILED, FRONTIER, Drive
 from mapspeak.driving.exploration.blocked import BlockedPlaces, TripEnd
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState
 from mapspeak.spatial.frontiers import ProvedGap, Tried, find_proved_gap
 from mapspeak.worldmodel.revision import MapRevision
@@ -22,7 +22,7 @@ class FrontierTries:
         self._blocked = BlockedPlaces()
         self._gaps: list[ProvedGap] = []
 
-    def learn(self, ended: Iterable[Drive], revision: MapRevision, robot: Point) -> None:
+    def learn(self, ended: Iterable[Drive], revision: MapRevision, robot: Pose) -> None:
         """Take in the drives that have ended.
 
         Args:
@@ -37,7 +37,7 @@ class FrontierTries:
                 if FRONTIER.fullmatch(drive.place):
                     self._looked_from.append(drive.goal.point)
             elif drive.final.state in FAILED:
-                self._learn_failure(drive, revision, drive.ended_at or robot)
+                self._learn_failure(drive, revision, drive.ended_at or robot.point)
 
     def find_tried(self, revision: MapRevision) -> Tried:
         """Return what counts on a map: what has changed there is worth another try."""

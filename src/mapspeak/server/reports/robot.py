@@ -322,7 +322,6 @@ class WriteAnswer(Report):
         *,
         merge: Merge,
         refused: Sequence[str],
-        things: Sequence[str] = (),
         warnings: Sequence[str] = (),
     ) -> Self:
         """Make the report of a write, with the id that the place has in the memory now."""
@@ -335,7 +334,7 @@ class WriteAnswer(Report):
             is_new=receipt.previous is None,
             replaced="; ".join(say_replaced(receipt.previous, merge.waypoint)),
             landmarks=list(say_landmarks(merge)),
-            things=list(things),
+            things=[],
             refused=list(refused),
             n_places=len(memory.waypoints),
             warnings=list(warnings),

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
+from mapspeak.driving.episodewriter import Keeping
 from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
@@ -145,21 +146,15 @@ class PaperTools:
         annotator.require_content(waypoint)
         session, memory, keeper = self._session, self._session.memory, self._session.keeper
         receipt, merge = await session.compute(lambda: memory.remember(waypoint, gone=gone or ()))
-        keep = partial(session.episodes.keep_record, waypoint, name_map=memory.name_map)
-        kept = await session.compute(keep)
+        kept = await self._keep_record(waypoint)
         unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
         far, moved = await self._say_far(receipt), await say_moved(session.compute(keeper.compare))
         far += await self._forget_gone(gone, merge, pose)
         places = await session.compute(memory.read)
-        told = filter(None, (*far, unsure, kept.fault, moved))
-        return WriteAnswer.of(
-            receipt,
-            places,
-            merge=merge,
-            refused=annotator.refused,
-            things=await self._place_things(receipt.waypoint.name),
-            warnings=(*told,),
-        )
+        told = (*filter(None, (*far, unsure, kept.fault, moved)),)
+        refused, things = annotator.refused, await self._place_things(receipt.waypoint.name)
+        report = WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=told)
+        return report.model_copy(update={"things": things})
 
     @tool("Recall remembered places", ToolEffect.READS, has_report=True)
     async def get_semantic_data(
@@ -235,6 +230,10 @@ class PaperTools:
                 f"{high.x:.1f}, y {low.y:.1f} to {high.y:.1f}.",
                 hint="Give metres in the map frame, or leave x and y out for the robot's own pose.",
             )
+
+    async def _keep_record(self, waypoint: Waypoint) -> Keeping:
+        keep, name_map = self._session.episodes.keep_record, self._session.memory.name_map
+        return await self._session.compute(partial(keep, waypoint, name_map=name_map))
 
     async def _place_things(self, name: str) -> list[str]:
         """Say where the things are that a place names; nothing where that takes long, or no map."""
