@@ -144,17 +144,16 @@ class PaperTools:
             picture=None if picture is None else picture.name,
         )
         annotator.require_content(waypoint)
-        session, memory, keeper = self._session, self._session.memory, self._session.keeper
+        session, memory = self._session, self._session.memory
         receipt, merge = await session.compute(lambda: memory.remember(waypoint, gone=gone or ()))
         kept = await self._keep_record(waypoint)
         unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
-        far, moved = await self._say_far(receipt), await say_moved(session.compute(keeper.compare))
-        far += await self._forget_gone(gone, merge, pose)
+        far = await self._say_far(receipt) + await self._forget_gone(gone, merge, pose)
+        moved = await say_moved(session.compute(session.keeper.compare))
         places = await session.compute(memory.read)
-        told = (*filter(None, (*far, unsure, kept.fault, moved)),)
-        refused, things = annotator.refused, await self._place_things(receipt.waypoint.name)
-        report = WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=told)
-        return report.model_copy(update={"things": things})
+        told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
+        answer = WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
+        return await self._with_things(answer, receipt.waypoint.name)
 
     @tool("Recall remembered places", ToolEffect.READS, has_report=True)
     async def get_semantic_data(
@@ -235,15 +234,16 @@ class PaperTools:
         keep, name_map = self._session.episodes.keep_record, self._session.memory.name_map
         return await self._session.compute(partial(keep, waypoint, name_map=name_map))
 
-    async def _place_things(self, name: str) -> list[str]:
-        """Say where the things are that a place names; nothing where that takes long, or no map."""
+    async def _with_things(self, answer: WriteAnswer, name: str) -> WriteAnswer:
+        """Add where the things are that a place names, where a map is and that is soon told."""
         try:
             world = await self._session.fetch_world_model()
         except (LinkError, MapError):
-            return []
+            return answer
         if len(world.places) > MOST_JOINED:
-            return []
-        return await self._session.compute(partial(say_placed, world, name))
+            return answer
+        things = await self._session.compute(partial(say_placed, world, name))
+        return answer.model_copy(update={"things": things})
 
     async def _find_room_id(self, pose: Pose) -> str | None:
         try:
