@@ -15,8 +15,8 @@ import anyio.to_thread
 from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.episodewriter import EpisodeWriter, Keeping
+from mapspeak.driving.exploration.tried import FrontierTries
 from mapspeak.driving.stops import Lease
-from mapspeak.driving.tried import FrontierTries
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore, PictureBook, SemanticMap
