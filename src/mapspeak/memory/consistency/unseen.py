@@ -1,6 +1,6 @@
 """Looks that should have shown a thing and did not, and things that stand elsewhere since."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 
@@ -10,7 +10,7 @@ from mapspeak.geometry import wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, judge_trust
 from mapspeak.memory.merging import NEAR_M, SAME_BEARING_RAD, find_cone, find_named
 from mapspeak.memory.things.finding import Things
-from mapspeak.memory.things.labels import name_the_same
+from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.thing import Thing
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial.grid import FloatArray
@@ -73,28 +73,36 @@ def _not_shown(
     if cone is None:
         return
     pose, named = waypoint.pose, find_named(waypoint)
-    for i in np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist():
+    near = np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist()
+    shown = _measure_shown(found, waypoint, [placed[i] for i in near], cone)
+    for i, shown_ratio in zip(near, shown.tolist(), strict=True):
         thing = placed[i]
-        assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
-        bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
-        is_told = any(
-            _may_be(thing, each, bearing_rad, owners.get((waypoint.name, each))) for each in named
-        )
-        is_counted = any(
-            view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting
-        )
-        if is_told or is_counted:
+        if shown_ratio < LEAST_SHOWN_RATIO or _is_told(thing, waypoint, named, owners):
             continue
-        shown_ratio = _measure_shown(found, waypoint, thing, cone)
-        if shown_ratio >= LEAST_SHOWN_RATIO:
-            yield MemoryFinding(
-                kind=FindingKind.NOT_SEEN,
-                waypoints=(waypoint.name,),
-                things=(thing,),
-                far_m=pose.point.distance_to(thing.position),
-                n_since=int(_is_later(waypoint, thing.last_seen)),
-                shown_ratio=shown_ratio,
-            )
+        assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
+        yield MemoryFinding(
+            kind=FindingKind.NOT_SEEN,
+            waypoints=(waypoint.name,),
+            things=(thing,),
+            far_m=pose.point.distance_to(thing.position),
+            n_since=int(_is_later(waypoint, thing.last_seen)),
+            shown_ratio=shown_ratio,
+        )
+
+
+def _is_told(
+    thing: Thing,
+    waypoint: Waypoint,
+    named: Sequence[Landmark],
+    owners: Mapping[tuple[str, Landmark], Thing],
+) -> bool:
+    """Return True when a waypoint names what may be a thing, or counts itself that it does not."""
+    pose = waypoint.pose
+    assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
+    bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
+    return any(
+        _may_be(thing, each, bearing_rad, owners.get((waypoint.name, each))) for each in named
+    ) or any(view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting)
 
 
 def _may_be(thing: Thing, landmark: Landmark, bearing_rad: float, owner: Thing | None) -> bool:
@@ -108,35 +116,42 @@ def _may_be(thing: Thing, landmark: Landmark, bearing_rad: float, owner: Thing |
 
 
 def _measure_shown(
-    found: Things, waypoint: Waypoint, thing: Thing, cone: tuple[float, float]
-) -> float:
-    """Return how likely a look shows a thing: over all that it may be, near, ahead, in sight."""
-    if thing.whereabouts is None or not len(thing.whereabouts):
-        return 0.0
+    found: Things, waypoint: Waypoint, things: Sequence[Thing], cone: tuple[float, float]
+) -> FloatArray:
+    """Return how likely a look shows each thing: over all that it may be, near, ahead, in sight."""
+    spots = [np.empty((0, 2)) if each.whereabouts is None else each.whereabouts for each in things]
+    points = np.concatenate([np.empty((0, 2)), *spots])
     pose = waypoint.pose
-    east, north = (thing.whereabouts - (pose.x, pose.y)).T
+    east, north = (points - (pose.x, pose.y)).T
     off_rad = np.remainder(np.arctan2(north, east) - pose.yaw_rad + np.pi, 2 * np.pi) - np.pi
     is_ahead = (cone[0] <= off_rad) & (off_rad <= cone[1]) & (np.hypot(east, north) <= NEAR_M)
-    return float((is_ahead * found.find_sight_ratios(waypoint, thing.whereabouts)).mean())
+    in_sight = is_ahead * found.find_sight_ratios(waypoint, points)
+    n_spots = np.array([len(each) for each in spots], dtype=np.intp)
+    sums = np.bincount(
+        np.repeat(np.arange(len(spots)), n_spots), weights=in_sight, minlength=len(spots)
+    )
+    return sums / np.maximum(n_spots, 1)
 
 
 def _moved(placed: Sequence[Thing], unseen: Sequence[MemoryFinding]) -> Iterator[MemoryFinding]:
     """Return pairs of a thing that is gone and the only one of its name that is new since."""
-    missed = {id(thing) for each in unseen if each.n_since for thing in each.things}
-    gone = [
-        thing
+    against: defaultdict[int, list[MemoryFinding]] = defaultdict(list)
+    for finding in unseen:
+        for thing in finding.things:
+            against[id(thing)].append(finding)
+    gone = {
+        id(thing)
         for thing in placed
-        if id(thing) in missed and judge_trust(thing, unseen).ratio < MOVED_RATIO
-    ]
+        if any(each.n_since for each in against[id(thing)])
+        and judge_trust(thing, against[id(thing)]).ratio < MOVED_RATIO
+    }
     pairs = [
         (old, new)
-        for old in gone
-        for new in placed
-        if new.first_seen is not None
-        and old.last_seen is not None
-        and new.first_seen > old.last_seen
-        and new not in gone
-        and name_the_same(old.label, new.label)
+        for alike in _group_by_name(placed)
+        for old in alike
+        for new in alike
+        if id(old) in gone and id(new) not in gone and _is_newer(new, old)
+        if name_the_same(old.label, new.label)
     ]
     n_pairs = Counter(id(thing) for pair in pairs for thing in pair)
     for old, new in pairs:
@@ -144,3 +159,18 @@ def _moved(placed: Sequence[Thing], unseen: Sequence[MemoryFinding]) -> Iterator
             yield MemoryFinding(
                 kind=FindingKind.MOVED, waypoints=new.waypoints[:1], things=(old, new)
             )
+
+
+def _group_by_name(things: Sequence[Thing]) -> Iterator[list[Thing]]:
+    """Return things in groups, so that two that may be one are in the same."""
+    by_label: defaultdict[str, list[Thing]] = defaultdict(list)
+    for thing in things:
+        by_label[thing.label].append(thing)
+    for group in group_names(list(by_label)):
+        yield [thing for label in sorted(group) for thing in by_label[label]]
+
+
+def _is_newer(new: Thing, old: Thing) -> bool:
+    if new.first_seen is None or old.last_seen is None:
+        return False
+    return new.first_seen > old.last_seen
