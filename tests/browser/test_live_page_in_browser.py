@@ -257,11 +257,11 @@ async def test_a_phone_shows_all_of_it_without_scrolling_sideways(tmp_path: Path
 
 
 @asynccontextmanager
-async def run_server(folder: Path, address: str) -> AsyncGenerator[Process]:
+async def run_server(folder: Path, address: str, *more: str) -> AsyncGenerator[Process]:
     """Run the command, as a client does that speaks over its standard input."""
     command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:flat_1"]
     command += ["--clock", "virtual", "--view", address]
-    command += ["--control", str(folder / "control"), "--audit", str(folder / "audit.jsonl")]
+    command += ["--control", str(folder / "control"), "--audit", str(folder / "audit.jsonl"), *more]
     async with await anyio.open_process(command) as process:
         assert process.stderr is not None
         told = ""
@@ -285,6 +285,18 @@ async def test_a_page_whose_server_ends_says_so_and_comes_back_with_the_next_one
         await expect(said).to_contain_text("NOT SENT")
         async with run_server(tmp_path, address):
             await expect(state).not_to_contain_text("does not answer", timeout=PATIENCE_MS)
+
+
+async def test_the_command_shows_the_missions_that_are_saved_beside_its_memory(
+    tmp_path: Path,
+) -> None:
+    saved = tmp_path / "places.memory" / "missions" / "patrol.yaml"
+    saved.parent.mkdir(parents=True)
+    saved.write_text("skills:\n- name: patrol\n  mission:\n  - wait: 1\n")
+    address = find_free_address()
+    memory = ("--memory", str(tmp_path / "places.yaml"), "--toolsets", "+missions")
+    async with run_server(tmp_path, address, *memory), browse(f"http://{address}/") as page:
+        await expect(page.locator("#missions")).to_contain_text("Saved mission: patrol")
 
 
 async def test_what_a_page_loads_besides_map_and_camera_is_small(tmp_path: Path) -> None:

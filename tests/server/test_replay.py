@@ -64,7 +64,7 @@ async def test_the_map_of_a_call_log_is_as_it_was_after_each_call(tmp_path: Path
         robot.grid = grid_from_text(ROOM, resolution_m=1.0)
         await client.call_tool("look_at_map", {})
     told = replay_log(log.path)
-    assert [step.n_moments for step in told.steps] == [1, 1, 1, 2, 3]
+    assert [step.n_moments for step in told.steps] == [1, 1, 2, 2, 3]
     first, noted_then, grown = told.moments
     assert first.overlay["doors"].names == ["D1"]
     assert (noted_then.map, list(noted_then.overlay)) == (None, ["places"])

@@ -460,11 +460,11 @@ async def test_what_stood_nearest_to_a_thing_goes_by_where_things_are(
             return text_of(await client.call_tool("recall_episodes", {"near_seen": words}))
 
         plants, by_room = await recall("potted plant"), await recall("potted plant in R2")
-        by_id, never = await recall("T1"), await recall("T0")
-        wanted = {"query": "fridge", "near": "T1"}
+        (plant_id,) = re.findall(r'^Nearest to (T\d) "potted plant" in R1, at ', plants)
+        by_id, never = await recall(plant_id), await recall("T0")
+        wanted = {"query": "fridge", "near": plant_id}
         found = report_of(await client.call_tool("find_place", wanted))
     first, things, heading, count, *rows = plants.splitlines()
-    assert first.startswith('Nearest to T1 "potted plant" in R1, at ')
     assert re.search(
         r'It was seen last of 2 called so; the others are T\d "potted plant" in R2', first
     )
@@ -473,7 +473,7 @@ async def test_what_stood_nearest_to_a_thing_goes_by_where_things_are(
     assert count.startswith("1 observation")
     assert '"sofa"' in " ".join(rows)
     assert re.match(r'Nearest to T\d "potted plant" in R2, at ', by_room)
-    assert by_id.startswith('Nearest to T1 "potted plant" in R1, at ')
+    assert by_id.startswith(f'Nearest to {plant_id} "potted plant" in R1, at ')
     assert "There is no place called 'T0'" in never
     assert re.search(r"called \"fridge\"; [12]\.\d m from \(7", found["candidates"][0]["why"])
 

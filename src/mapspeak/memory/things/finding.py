@@ -165,12 +165,11 @@ def _solve(sight: SightMap, pool: Sequence[WeighedView]) -> list[Located]:
 
 
 def _place(posteriors: Posteriors, group: Group) -> Placement:
-    """Place a thing by all its views, or by one of them that alone places it better.
-
-    So no further view makes the place of a thing less sure.
-    """
+    """Place a thing by all its views, or by the surest of two directions that hardly agree."""
     together = _place_by(posteriors, group)
-    alone = (_place_by(posteriors, [each]) for each in group if len(group) > 1)
+    if len(group) != 2 or any(each.landmark.range_m is not None for each in group):
+        return together
+    alone = (_place_by(posteriors, [each]) for each in group)
     return min((together, *alone), key=lambda each: each.uncertainty_m)
 
 

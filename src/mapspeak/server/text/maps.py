@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from mapspeak.server.text.wording import say_point
 from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierMerit,
@@ -155,7 +154,8 @@ def say_refusal(border: RefusedFrontier) -> str:
             needed_m = border.needed_width_m
             return f"gap of {border.gap_width_m:.1f} m, the robot needs {needed_m:.2f} m"
         case RefusalReason.PROVED_NARROW:
-            where = "" if border.gap_at is None else f" at {say_point(border.gap_at)}"
+            gap = border.gap_at
+            where = "" if gap is None else f" at {gap.x:.2f}, {gap.y:.2f}"
             return (
                 f"behind the gap{where}, {border.gap_width_m:.2f} m wide by the map: a drive found "
                 "no way through it"
