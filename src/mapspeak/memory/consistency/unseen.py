@@ -6,7 +6,7 @@ from datetime import datetime
 
 import numpy as np
 
-from mapspeak.geometry import wrap_angle
+from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, judge_trust
 from mapspeak.memory.merging import NEAR_M, SAME_BEARING_RAD, find_cone, find_named
 from mapspeak.memory.things.finding import Things
@@ -76,15 +76,15 @@ def _not_shown(
     near = np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist()
     shown = _measure_shown(found, waypoint, [placed[i] for i in near], cone)
     for i, shown_ratio in zip(near, shown.tolist(), strict=True):
-        thing = placed[i]
-        if shown_ratio < LEAST_SHOWN_RATIO or _is_told(thing, waypoint, named, owners):
+        thing, point = placed[i], Point(*at[i].tolist())
+        bearing_rad = wrap_angle(pose.point.bearing_to(point) - pose.yaw_rad)
+        if shown_ratio < LEAST_SHOWN_RATIO or _is_told(thing, waypoint, named, bearing_rad, owners):
             continue
-        assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
         yield MemoryFinding(
             kind=FindingKind.NOT_SEEN,
             waypoints=(waypoint.name,),
             things=(thing,),
-            far_m=pose.point.distance_to(thing.position),
+            far_m=pose.point.distance_to(point),
             n_since=int(_is_later(waypoint, thing.last_seen)),
             shown_ratio=shown_ratio,
         )
@@ -94,12 +94,14 @@ def _is_told(
     thing: Thing,
     waypoint: Waypoint,
     named: Sequence[Landmark],
+    bearing_rad: float,
     owners: Mapping[tuple[str, Landmark], Thing],
 ) -> bool:
-    """Return True when a waypoint names what may be a thing, or counts itself that it does not."""
-    pose = waypoint.pose
-    assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
-    bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
+    """Return True when a waypoint names what may be a thing, or itself counts that it does not.
+
+    Args:
+        bearing_rad: From the waypoint's heading to the thing.
+    """
     return any(
         _may_be(thing, each, bearing_rad, owners.get((waypoint.name, each))) for each in named
     ) or any(view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting)
