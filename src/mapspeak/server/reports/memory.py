@@ -216,7 +216,7 @@ class RecallAnswer(Report):
     @property
     def text(self) -> str:
         """The answer in lines: what to do, a line for each candidate, what speaks for the first."""
-        heading = f"{self.n_fitting} of {self.n_searched} fit {quote(self.understood)}"
+        heading = f"{self.n_fitting} of {self.n_searched} fit {quote(self.understood)} best"
         lines = [self.advice]
         for first in self.candidates[:1]:
             lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))
