@@ -115,7 +115,7 @@ async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
     cpus_ms: list[float] = []
     with _publisher(find_message(TYPE), domain_id) as publish, anyio.fail_after(PATIENCE_S):
         async with open_ros2_connection(domain_id=domain_id) as connection:
-            maps = connection.subscribe(TOPIC, is_bulky=True)
+            maps = connection.subscribe(TOPIC)
             publish(message)
             await maps.wait_for_more_than(0, timeout_s=PATIENCE_S)
             for _ in range(N_RUNS):
@@ -147,7 +147,7 @@ async def _ask(side: int, connect: Connect) -> list[float]:
                 for _ in range(N_RUNS):
                     await anyio.sleep(PAUSE_S)
                     before_s = time.perf_counter()
-                    maps = connection.subscribe(TOPIC, is_bulky=True)
+                    maps = connection.subscribe(TOPIC)
                     read_grid(await maps.wait_for_more_than(0, timeout_s=PATIENCE_S))
                     asked_ms.append((time.perf_counter() - before_s) * 1e3)
                     connection.unsubscribe(maps)

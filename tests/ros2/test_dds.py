@@ -93,7 +93,7 @@ async def test_map_pose_and_picture_are_the_robots(robot: RobotProcess) -> None:
 
 async def test_a_change_of_the_map_arrives(robot: RobotProcess) -> None:
     async with connected(robot) as connection:
-        maps = connection.subscribe("/map", is_bulky=True)
+        maps = connection.subscribe("/map")
         await maps.wait_for_more_than(0, timeout_s=PATIENCE_S)
         robot.change_map("###\n#.#\n###")
         message = await maps.wait_for_more_than(1, timeout_s=PATIENCE_S)

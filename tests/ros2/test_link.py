@@ -102,7 +102,7 @@ async def test_a_new_map_and_a_part_of_one_are_taken_in(robot: RobotProcess) -> 
 async def test_a_renewed_subscription_hears_what_is_latched_again(robot: RobotProcess) -> None:
     assert robot.process.poll() is None
     async with connected() as connection:
-        maps = connection.subscribe("/map", is_bulky=True)
+        maps = connection.subscribe("/map")
         await maps.wait_for_more_than(0, timeout_s=PATIENCE_S)
         connection.renew(maps)
         again = await maps.wait_for_more_than(1, timeout_s=PATIENCE_S)
@@ -298,7 +298,7 @@ async def test_what_is_published_arrives_as_it_was(domain: dict[str, str]) -> No
     cells = np.arange(-100, 100, dtype=np.int8)
     async with connected() as sender, connected() as receiver:
         sender.advertise("/grid", type_name=MAP_TYPE)
-        heard = receiver.subscribe("/grid", type_name=MAP_TYPE, is_bulky=True)
+        heard = receiver.subscribe("/grid", type_name=MAP_TYPE)
         message = {"header": {"frame_id": "äöü"}, "info": {"width": 200}, "data": cells}
         while heard.latest is None:
             await sender.publish("/grid", message)

@@ -351,7 +351,6 @@ async def test_a_latched_message_that_was_missed_is_asked_for_again() -> None:
             client,
             "/map",
             type_name="nav_msgs/msg/OccupancyGrid",
-            is_bulky=True,
             n=1,
             wait_s=20.0,
             duration_s=0.0,

@@ -24,7 +24,7 @@ from mapspeak.links.endpoints import (
 from mapspeak.links.goals import ActionWire, ServiceClient
 from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.link import RosLink, TopicRequest, check_name, wrong_type
-from mapspeak.ros.messages.fields import TYPE, Dialect, Message, bare_type
+from mapspeak.ros.messages.fields import BULKY, TYPE, Dialect, Message, bare_type
 from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import OwnEnds, RosGraph
 
@@ -186,7 +186,7 @@ class NativeLink(RosLink[NativeRequest]):
         quality = self._quality(
             is_reliable=all(each.is_reliable for each in writers),
             is_latched=all(each.is_latched for each in writers),
-            depth=BULKY_DEPTH if request.is_bulky else DEPTH,
+            depth=BULKY_DEPTH if bare_type(type_name) in BULKY else DEPTH,
         )
         keys = frozenset(each.key for each in writers)
         is_new = self.reads_anew and not keys <= request.writers

@@ -93,7 +93,6 @@ class TopicRequest:
     """The request for a topic; each link adds its reader."""
 
     subscription: Subscription
-    is_bulky: bool
     throttle_ms: int
     n_renewals: int = 0
 
@@ -112,19 +111,14 @@ class RosLink(ParameterServices, Generic[Request]):
         self.announcements = Announcements(self._announce, self._take_back)
 
     def subscribe(
-        self,
-        topic: str,
-        *,
-        type_name: str | None = None,
-        is_bulky: bool = False,
-        throttle_ms: int = 0,
+        self, topic: str, *, type_name: str | None = None, throttle_ms: int = 0
     ) -> Subscription:
         """Return the subscription to a topic; its first request sets the throttling."""
         request = self.requests.get(topic)
         if request is None:
             self._check(topic, type_name)
             subscription = Subscription(topic, type_name=type_name)
-            request = self._request_type(subscription, is_bulky, throttle_ms)
+            request = self._request_type(subscription, throttle_ms)
             self._begin(request)
             self.requests[topic] = request
         request.subscription.n_users += 1

@@ -134,17 +134,12 @@ class RosConnection(Protocol):
         """Return at once, or when the connection is open again."""
 
     def subscribe(
-        self,
-        topic: str,
-        *,
-        type_name: str | None = None,
-        is_bulky: bool = False,
-        throttle_ms: int = 0,
+        self, topic: str, *, type_name: str | None = None, throttle_ms: int = 0
     ) -> Subscription:
         """Return the subscription to a topic; begin one where there is none yet.
 
-        The type is as this ROS writes it; None looks it up. Bulky messages hold large arrays: maps,
-        scans, pictures. Throttling keeps a least time between two messages.
+        The type is as this ROS writes it; None looks it up. Throttling keeps a least time between
+        two messages.
         """
 
     def unsubscribe(self, subscription: Subscription) -> None:

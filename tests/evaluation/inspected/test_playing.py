@@ -53,7 +53,7 @@ async def test_streams_come_with_stamps_of_the_robots_clock(dialect: Dialect) ->
 async def test_the_map_is_kept_for_those_who_come_later(dialect: Dialect) -> None:
     names, system = drawn(dialect)
     async with play(system) as url, open_client(RobotAddress(url=url)) as client:
-        heard = client.subscribe(names.map, is_bulky=True)
+        heard = client.subscribe(names.map, type_name=dialect.type_name("nav_msgs/OccupancyGrid"))
         grid = read_grid(await heard.wait_for_more_than(0, timeout_s=PATIENCE_S))
         assert np.array_equal(grid.cells, two_rooms().cells)
 

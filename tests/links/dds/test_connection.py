@@ -56,7 +56,7 @@ async def test_a_map_sent_before_we_came_is_received() -> None:
         node.publish("/map", GRID)
 
     async with open_both(prepare) as (_, connection):
-        maps = connection.subscribe("/map", is_bulky=True)
+        maps = connection.subscribe("/map")
         grid = read_grid(await maps.wait_for_more_than(0, timeout_s=5.0))
     assert grid.cells.tolist() == [[0, 0, 100], [-1, 0, 0]]
     assert grid.resolution_m == 0.05

@@ -20,6 +20,7 @@ from mapspeak.links.rosbridge.protocol.conversation import (
 )
 from mapspeak.links.rosbridge.websocket import open_websocket
 from mapspeak.ros.link import TopicRequest
+from mapspeak.ros.messages.fields import BULKY, bare_type
 from mapspeak.ros.patience import Patience
 
 logger = logging.getLogger(__name__)
@@ -264,6 +265,7 @@ class RosbridgeTopicRequest(TopicRequest):
     @property
     def encoding(self) -> Encoding:
         """The encoding in which the server shall send messages."""
-        if not self.is_bulky:
+        type_name = self.subscription.type_name
+        if type_name is None or bare_type(type_name) not in BULKY:
             return Encoding.JSON
         return ENCODINGS[min(self.n_renewals, len(ENCODINGS) - 1)]

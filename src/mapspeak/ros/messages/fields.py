@@ -128,6 +128,19 @@ NANOSECONDS = 1_000_000_000
 LARGEST_SECONDS = 2**32 - 1
 
 
+BULKY = frozenset(
+    {
+        "map_msgs/OccupancyGridUpdate",
+        "nav_msgs/OccupancyGrid",
+        "sensor_msgs/CompressedImage",
+        "sensor_msgs/Image",
+        "sensor_msgs/LaserScan",
+        "sensor_msgs/PointCloud2",
+    }
+)
+"""Types of large arrays without fixed length, which come faster in binary."""
+
+
 class Dialect(StrEnum):
     """The version of ROS at the other end."""
 

@@ -73,13 +73,11 @@ class MapSubscriber:
             self._maps = self._connection.subscribe(
                 topic,
                 type_name=self._profile.dialect.type_name(MAP),
-                is_bulky=True,
             )
             if self._profile.map_updates_topic is not None:
                 self._updates = self._connection.subscribe(
                     self._profile.map_updates_topic,
                     type_name=self._profile.dialect.type_name(MAP_UPDATE),
-                    is_bulky=True,
                 )
                 self._updates.listen(self._take_update)
         return self._maps

@@ -121,7 +121,7 @@ class RosCamera:
             raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
         type_name = profile.dialect.type_name(profile.camera_type or RAW_IMAGE)
         pictures = self._connection.subscribe(
-            profile.camera_topic, type_name=type_name, is_bulky=True, throttle_ms=THROTTLE_MS
+            profile.camera_topic, type_name=type_name, throttle_ms=THROTTLE_MS
         )
         if profile.camera_info_topic is None:
             return (pictures,)
@@ -211,7 +211,7 @@ class Laser:
             raise LinkError("The robot publishes no scans.", hint="Name scan_topic in robot.yaml.")
         type_name = profile.dialect.type_name("sensor_msgs/LaserScan")
         scans = self._connection.subscribe(
-            profile.scan_topic, type_name=type_name, is_bulky=True, throttle_ms=THROTTLE_MS
+            profile.scan_topic, type_name=type_name, throttle_ms=THROTTLE_MS
         )
         return (scans,)
 

@@ -11,7 +11,6 @@ from mapspeak.server.tools.ros.frames import TRANSFORMS, hear_frames, say_frames
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import cut
-from mapspeak.server.tools.ros.views import BULKY
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
@@ -102,7 +101,6 @@ class MeasuringTools:
             self._inquiry.connection,
             name,
             type_name=await self._inquiry.said(type_name),
-            is_bulky=type_name in BULKY,
             n=1,
             wait_s=duration_s,
             duration_s=duration_s,

@@ -63,7 +63,6 @@ async def hear(
     topic: str,
     *,
     type_name: str,
-    is_bulky: bool,
     n: int,
     wait_s: float,
     duration_s: float,
@@ -75,14 +74,13 @@ async def hear(
         connection: To listen with.
         topic: Its full name.
         type_name: As this ROS writes it.
-        is_bulky: Messages hold large arrays.
         n: How many messages are wanted at most.
         wait_s: Without a duration: how long to wait for them.
         duration_s: How long to listen; 0 ends with the last wanted message. With a subscription
             already open, a topic's latest message counts.
         renew_s: Waits for a first message, after each of which the topic is asked for anew.
     """
-    subscription = connection.subscribe(topic, type_name=type_name, is_bulky=is_bulky)
+    subscription = connection.subscribe(topic, type_name=type_name)
     started_s = anyio.current_time()
     try:
         collector = _Collector(subscription, n)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.definitions.checking import check_message
-from mapspeak.ros.messages.fields import Message, bare_type
+from mapspeak.ros.messages.fields import BULKY, Message, bare_type
 from mapspeak.safety import Publish, zero_velocity_of
 from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
@@ -20,7 +20,7 @@ from mapspeak.server.tools.ros.measuring import say_silence
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, cut, list_page, match_names, say_loss
 from mapspeak.server.tools.ros.summaries import MOST_SUMMED, SUMMARIES
-from mapspeak.server.tools.ros.views import BULKY, MessageView, view_message
+from mapspeak.server.tools.ros.views import MessageView, view_message
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
@@ -162,7 +162,6 @@ class TopicTools:
             self._inquiry.connection,
             name,
             type_name=await self._inquiry.said(type_name),
-            is_bulky=type_name in BULKY,
             n=n,
             wait_s=wait_s,
             duration_s=duration_s,

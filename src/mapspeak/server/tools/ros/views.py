@@ -215,8 +215,6 @@ VIEWS: Mapping[str, Callable[[Message], MessageView]] = {
 }
 VIEWED: frozenset[str] = frozenset(VIEWS)
 """Types that are shown in a way of their own."""
-BULKY: frozenset[str] = VIEWED - {"tf2_msgs/TFMessage", "nav_msgs/Path"}
-"""Types of large arrays without fixed length, which come faster in binary."""
 
 
 def view_fields(

@@ -62,7 +62,6 @@ class SessionFacts:
                 inquiry.connection,
                 topic,
                 type_name=await inquiry.said(BATTERY),
-                is_bulky=False,
                 n=1,
                 wait_s=HEAR_S,
                 duration_s=0.0,

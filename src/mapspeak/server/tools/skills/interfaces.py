@@ -16,7 +16,6 @@ from mapspeak.server.tools.ros.frames import check_frames
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import Described
 from mapspeak.server.tools.ros.reading import hear
-from mapspeak.server.tools.ros.views import BULKY
 from mapspeak.skill import (
     Arguments,
     JsonValue,
@@ -175,7 +174,6 @@ class _Opened:
             self.ros.inquiry.connection,
             self.interface.name,
             type_name=await self.ros.inquiry.said(self.interface.type),
-            is_bulky=self.interface.type in BULKY,
             n=1,
             wait_s=self.spec.timeout_s,
             duration_s=0.0,
