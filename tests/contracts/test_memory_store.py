@@ -68,7 +68,7 @@ def names(store: MemoryStore) -> list[str]:
 def test_a_memory_that_was_never_written_to_is_empty(store: MemoryStore) -> None:
     assert store.read().waypoints == ()
     assert store.read_events() == ()
-    assert store.read_entry("snapshot") is None
+    assert store.read().frames.own_walls == "map.yaml"
 
 
 def test_a_new_name_creates_a_waypoint(store: MemoryStore) -> None:

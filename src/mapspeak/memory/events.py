@@ -163,10 +163,11 @@ class Event:
         begins, until = self.find_time(now)
         return (begins is None or begins <= now) and (until is None or now < until)
 
-    def moved(self, motion: Pose) -> "Event":
+    def moved(self, motion: Pose, into: FrameId = None) -> "Event":
         """Return it in another frame, by the transform from the present one to that."""
         return replace(
             self,
+            frame=into,
             at=None if self.at is None else motion.transform(self.at),
             outlines=tuple(tuple(map(motion.transform, outline)) for outline in self.outlines),
         )

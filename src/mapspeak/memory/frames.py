@@ -8,12 +8,25 @@ frame `in`, by default the memory's own; without a pose its transform is unknown
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol, Self, TypeVar
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 
 FrameId = str | None
 """None is the memory's own frame."""
+OWN_WALLS = "map.yaml"
+"""Default name of the kept map of the memory's own frame."""
+
+
+class _Framed(Protocol):
+    @property
+    def frame(self) -> FrameId: ...
+
+    def moved(self, motion: Pose, into: FrameId = None) -> Self: ...
+
+
+AnyFramed = TypeVar("AnyFramed", bound=_Framed)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,14 +55,24 @@ class MapFrame:
 
 @dataclass(frozen=True)
 class Frames:
-    """All frames of a memory beside its own: forests of frames whose relation is known."""
+    """All frames of a memory beside its own: forests of frames whose relation is known.
+
+    Attributes:
+        own_walls: The name of the kept map of the memory's own frame.
+    """
 
     items: tuple[MapFrame, ...] = ()
+    own_walls: str = OWN_WALLS
 
     @cached_property
     def by_id(self) -> Mapping[str, MapFrame]:
         """Each frame under its id."""
         return {frame.id: frame for frame in self.items}
+
+    @property
+    def walls(self) -> Mapping[FrameId, str]:
+        """The names of kept maps by their frames, the memory's own first."""
+        return {None: self.own_walls} | {each.id: each.walls for each in self.items if each.walls}
 
     def find_root(self, frame_id: FrameId) -> tuple[FrameId, Pose]:
         """Return the root of a frame, and its pose there.
@@ -72,18 +95,24 @@ class Frames:
         (root, pose), (other_root, other_pose) = self.find_root(of), self.find_root(into)
         return other_pose.inverse() @ pose if root == other_root else None
 
+    def bring(self, record: AnyFramed, into: FrameId) -> AnyFramed | None:
+        """Return a record in another frame; None if unknown."""
+        if record.frame == into:
+            return record
+        motion = self.find_transform(of=record.frame, into=into)
+        return None if motion is None else record.moved(motion, into)
+
     def added(self, frame: MapFrame) -> "Frames":
         """Return them with another frame."""
-        return Frames((*self.items, frame))
+        return replace(self, items=(*self.items, frame))
 
     def changed(self, frame_id: str, **entries: object) -> "Frames":
         """Return them with one frame changed."""
-        return Frames(
-            tuple(
-                replace(each, **entries) if each.id == frame_id else each  # type: ignore[arg-type]  # as replace takes them
-                for each in self.items
-            )
+        items = (
+            replace(each, **entries) if each.id == frame_id else each  # type: ignore[arg-type]  # as replace takes them
+            for each in self.items
         )
+        return replace(self, items=tuple(items))
 
     def aligned(self, of: FrameId, into: FrameId, *, motion: Pose) -> "Frames":
         """Return them with a transform between two frames that had none so far.

@@ -14,9 +14,6 @@ from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map
 
-OWN_WALLS = "map.yaml"
-"""Default name of the walls of a memory's own frame."""
-
 
 class KeptWalls(Protocol):
     """Maps by their names, kept where the memory is.

@@ -146,10 +146,11 @@ class Waypoint:
         """Return the pose that one of its landmarks was seen from, in the map frame."""
         return landmark.pose or self.pose
 
-    def moved(self, motion: Pose) -> "Waypoint":
+    def moved(self, motion: Pose, into: FrameId = None) -> "Waypoint":
         """Return it with all poses moved to another frame, where ids of rooms mean nothing."""
         return replace(
             self,
+            frame=into,
             pose=motion @ self.pose,
             room_id=None,
             safety_landmarks=tuple(_moved(each, motion) for each in self.safety_landmarks),

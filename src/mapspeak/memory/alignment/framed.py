@@ -86,15 +86,11 @@ class FramedMemory(MemoryStore):
         return tuple(filter(None, (self._place_event(each, frames) for each in events)))
 
     def _place_event(self, event: Event, frames: Frames) -> Event | None:
-        here, keeper = self.keeper.frame, self.keeper
-        if keeper.is_placed and event.frame == here:
-            return event
-        motion = frames.find_transform(of=event.frame, into=here) if keeper.is_placed else None
-        if motion is not None:
-            return replace(event.moved(motion), frame=here)
+        keeper = self.keeper
+        placed = frames.bring(event, keeper.frame) if keeper.is_placed else None
         has_metres = event.at is not None or bool(event.outlines)
         is_of_no_map = event.frame is None and not keeper.has_walls(None)
-        return event if is_of_no_map and not has_metres else None
+        return event if placed is None and is_of_no_map and not has_metres else placed
 
     def name_map(self) -> str | None:
         """Return the name of the robot's map in observations; begin a frame if needed.
@@ -120,10 +116,6 @@ class FramedMemory(MemoryStore):
             if motion is not None:
                 placings.append(MapPlacing(name, motion))
         return tuple(placings)
-
-    def read_entry(self, key: str) -> str | None:
-        """See `MemoryStore`."""
-        return self.store.read_entry(key)
 
     def write(self, waypoint: Waypoint) -> WriteReceipt:
         """Write a waypoint that is in the frame of the robot's map."""
@@ -166,7 +158,7 @@ class FramedMemory(MemoryStore):
             return None
         known = self._moved.get(id(waypoint))
         if known is None or known[0] is not waypoint or known[1] != motion:
-            known = (waypoint, motion, replace(waypoint.moved(motion), frame=here))
+            known = (waypoint, motion, waypoint.moved(motion, here))
             self._moved[id(waypoint)] = known
         return known[2]
 

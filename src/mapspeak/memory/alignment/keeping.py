@@ -18,12 +18,9 @@ from mapspeak.memory.alignment.fitting import LEAST_SHARED_M, Certainty
 from mapspeak.memory.alignment.surfaces import MapSurfaces, judge
 from mapspeak.memory.frames import FrameId, MapFrame
 from mapspeak.memory.store.memorystore import MemoryStore
-from mapspeak.memory.walls import OWN_WALLS
 from mapspeak.memory.waypoint import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 
-KEY = "snapshot"
-"""Key of the kept map of the memory's own frame."""
 GROWN_RATIO = 0.1
 """A map with this share of floor more than the kept one replaces it."""
 SHRUNK_RATIO = 0.5
@@ -279,19 +276,15 @@ class FrameKeeper:
 
     def _find_kept(self, memory: SemanticMap) -> Iterator[tuple[FrameId, str, OccupancyGrid]]:
         """Return the frames with kept walls, the memory's own first."""
-        named = ((frame.id, frame.walls) for frame in memory.frames.items)
-        for frame_id, name in ((None, self._walls_of(None)), *named):
-            kept = None if name is None else self._load(name)
-            if name is not None and kept is not None:
+        for frame_id, name in memory.frames.walls.items():
+            kept = self._load(name)
+            if kept is not None:
                 yield frame_id, name, kept
 
     # --- kept walls --------------------------------------------------------------------------
 
     def _walls_of(self, frame_id: FrameId) -> str | None:
-        if frame_id is None:
-            return self._store.read_entry(KEY) or OWN_WALLS
-        frame = self._store.read().frames.by_id.get(frame_id)
-        return None if frame is None else frame.walls
+        return self._store.read().frames.walls.get(frame_id)
 
     def _keep_walls(self, grid: OccupancyGrid, name: str | None) -> bool:
         """Keep walls for the first time; False if another robot was first."""

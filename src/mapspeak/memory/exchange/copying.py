@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.alignment.keeping import KEY
+from mapspeak.memory.frames import OWN_WALLS
 from mapspeak.memory.store.memorystore import MemoryStore
-from mapspeak.memory.walls import OWN_WALLS
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 
@@ -39,7 +38,10 @@ def copy_memory(source: MemoryStore, target: MemoryStore) -> Copied:
             "The target has events already.", hint="Copy into a new file or database."
         )
     target.write_all(fill)
-    _copy_walls(source, target, places)
+    for frame_id, name in places.frames.walls.items():
+        grid = source.walls.load(name)
+        if grid is not None:
+            target.walls.keep(grid, OWN_WALLS if frame_id is None else name)
     if places.frames.items:
         target.write_frames(lambda _: places.frames)
     for event in events:
@@ -47,12 +49,3 @@ def copy_memory(source: MemoryStore, target: MemoryStore) -> Copied:
     return Copied(
         n_places=len(places.waypoints), n_events=len(events), n_frames=len(places.frames.items)
     )
-
-
-def _copy_walls(source: MemoryStore, target: MemoryStore, places: SemanticMap) -> None:
-    own = source.read_entry(KEY) or OWN_WALLS
-    named = ((frame.walls, frame.walls) for frame in places.frames.items)
-    for name, copy in ((own, OWN_WALLS), *named):
-        grid = None if name is None else source.walls.load(name)
-        if grid is not None and copy is not None:
-            target.walls.keep(grid, copy)

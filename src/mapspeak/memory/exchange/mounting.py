@@ -1,16 +1,14 @@
 """The frames of a second memory among those of a first one, aligned by their kept walls."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from mapspeak.geometry import Pose
 from mapspeak.memory.alignment.comparing import MapRelation, compare_maps
-from mapspeak.memory.alignment.keeping import KEY
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import FrameId, Frames, MapFrame
 from mapspeak.memory.store.memorystore import MemoryStore
-from mapspeak.memory.walls import OWN_WALLS
 from mapspeak.memory.waypoint import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 
@@ -64,7 +62,7 @@ def mount(first: MemoryStore, second: MemoryStore) -> Mount:
         SemanticMapError: A kept map is damaged.
     """
     whole, other = first.read(), second.read()
-    mine, theirs = dict(_find_kept(first)), dict(_find_kept(second))
+    mine, theirs = _load_kept(first), _load_kept(second)
     found = _find_motion(theirs[None], mine) if None in theirs else None
     has_no_walls = None not in mine or None not in theirs
     is_named = has_no_walls and whole.map_id is not None and whole.map_id == other.map_id
@@ -86,32 +84,15 @@ def mount(first: MemoryStore, second: MemoryStore) -> Mount:
             )
     for frame in other.frames.items:
         ids[frame.id] = frames.free_id()
-        frames = frames.added(MapFrame(id=frames.free_id()))
+        frames = frames.added(replace(frame, id=frames.free_id(), walls=None))
     for frame in other.frames.items:
-        frames = frames.changed(
-            ids[frame.id] or "",
-            map_id=frame.map_id,
-            robot=frame.robot,
-            pose=frame.pose,
-            reference=ids.get(frame.reference, frame.reference),
-        )
-    own_name = first.read_entry(KEY) or OWN_WALLS
-    return _with_walls(frames, ids, mine, theirs, finding, own_name)
-
-
-def _with_walls(
-    frames: Frames,
-    ids: Mapping[FrameId, FrameId],
-    mine: Mapping[FrameId, OccupancyGrid],
-    theirs: Mapping[FrameId, OccupancyGrid],
-    finding: str,
-    own_name: str,
-) -> Mount:
-    """Return the mount with a name for each kept map; of two of one frame the first's is kept."""
-    kept = {ids[frame_id]: grid for frame_id, grid in theirs.items()} | dict(mine)
+        reference = ids.get(frame.reference, frame.reference)
+        frames = frames.changed(ids[frame.id] or "", reference=reference)
+    # Of two maps of one frame the first memory's is kept.
+    kept = {ids[frame_id]: grid for frame_id, grid in theirs.items()} | mine
     walls = {}
     for number, (frame_id, grid) in enumerate(kept.items(), start=2):
-        name = own_name if frame_id is None else f"map-{number}.yaml"
+        name = frames.own_walls if frame_id is None else f"map-{number}.yaml"
         walls[name] = grid
         if frame_id is not None:
             frames = frames.changed(frame_id, walls=name)
@@ -132,9 +113,7 @@ def _find_motion(
     return None
 
 
-def _find_kept(store: MemoryStore) -> Iterator[tuple[FrameId, OccupancyGrid]]:
-    named = ((frame.id, frame.walls) for frame in store.read().frames.items)
-    for frame_id, name in ((None, store.read_entry(KEY) or OWN_WALLS), *named):
-        grid = None if name is None else store.walls.load(name)
-        if grid is not None:
-            yield frame_id, grid
+def _load_kept(store: MemoryStore) -> dict[FrameId, OccupancyGrid]:
+    names = store.read().frames.walls
+    grids = {frame_id: store.walls.load(name) for frame_id, name in names.items()}
+    return {frame_id: grid for frame_id, grid in grids.items() if grid is not None}

@@ -8,9 +8,7 @@ from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.episodes.store import BroughtOver, bring_over
-from mapspeak.memory.events import Event
-from mapspeak.memory.exchange.mounting import Mount, mount
-from mapspeak.memory.frames import Frames
+from mapspeak.memory.exchange.mounting import mount
 from mapspeak.memory.merging import merge_waypoint
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.store.durable import sync_folder
@@ -60,7 +58,7 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
     for place in second.waypoints:
         key = name_key(place.name)
         mine = places.get(key)
-        theirs = place if mine is None else _in_frame_of(mine, place, first.frames)
+        theirs = place if mine is None else first.frames.bring(place, mine.frame)
         if mine is None:
             places[key] = place
         elif theirs is None or data_of(mine) != data_of(theirs):
@@ -81,14 +79,6 @@ def unite(first: SemanticMap, second: SemanticMap) -> Union:
 
 
 APART = "nobody knows how the one's map lies to the other's"
-
-
-def _in_frame_of(mine: Waypoint, theirs: Waypoint, frames: Frames) -> Waypoint | None:
-    """Return a place with its poses in the frame of another; None if unknown."""
-    if theirs.frame == mine.frame:
-        return theirs
-    motion = frames.find_transform(of=theirs.frame, into=mine.frame)
-    return None if motion is None else replace(theirs.moved(motion), frame=mine.frame)
 
 
 def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
@@ -181,12 +171,17 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
             raise SemanticMapError(message, hint="Name a semantic map file, such as places.yaml.")
     mine, theirs = SemanticMapStore(first), SemanticMapStore(second)
     mounted = mount(mine, theirs)
-    union = unite(replace(mine.read(), frames=mounted.frames), mounted.rename_places(theirs.read()))
     part = out.with_name(f"{out.stem}.part")
     try:
         # The rest of the first file stays: comments, people's own keys.
         shutil.copyfile(first, part)
-        _fill(SemanticMapStore(part), union, mounted, theirs.read_events())
+        whole = SemanticMapStore(part)
+        whole.write_frames(lambda _: mounted.frames)
+        union = merge_into(whole, mounted.rename_places(theirs.read()))
+        known = [replace(each, id="") for each in whole.read_events()]
+        for event in map(mounted.rename_event, theirs.read_events()):
+            if event not in known:
+                whole.write_event(event)
         map_id = mine.read().map_id
         came = bring_over(
             first,
@@ -204,13 +199,3 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
             left.unlink(missing_ok=True)
     findings = tuple(filter(None, (mounted.finding, *union.findings)))
     return replace(union, findings=findings), came
-
-
-def _fill(whole: SemanticMapStore, union: Union, mounted: Mount, events: Iterable[Event]) -> None:
-    """Add to a copy of the first memory what it lacks."""
-    whole.write_frames(lambda _: mounted.frames)
-    whole.write_all(lambda _: union.changed)
-    known = [replace(each, id="") for each in whole.read_events()]
-    for event in map(mounted.rename_event, events):
-        if event not in known:
-            whole.write_event(event)

@@ -121,10 +121,6 @@ class PostgresStore(MemoryStore):
         """Return all events, also those that are over."""
         return tuple(self._look().of(_EVENT).values())
 
-    def read_entry(self, key: str) -> str | None:
-        """Return the entry under one of the memory's own keys."""
-        return cast("str | None", self._look().of(_ENTRY).get(key))
-
     def close(self) -> None:
         """End the connection; the next call makes another."""
         self._database.close()

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import cast
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.frames import Frames, MapFrame
+from mapspeak.memory.frames import OWN_WALLS, Frames, MapFrame
 from mapspeak.memory.store.cutting import Section, split_end
 from mapspeak.memory.store.editing import edited_item
 from mapspeak.memory.store.reading import (
@@ -75,7 +75,9 @@ class MapDocument(Contents):
     @cached_property
     def frames(self) -> Frames:
         """All frames but the file's own."""
-        return Frames(cast("tuple[MapFrame, ...]", self.records_of("frames")))
+        frames, walls = self.records_of("frames"), self.root.get("snapshot")
+        own_walls = walls if isinstance(walls, str) and walls else OWN_WALLS
+        return Frames(cast("tuple[MapFrame, ...]", frames), own_walls)
 
     def records_of(self, list_key: str) -> tuple[Record, ...]:
         """Return all records of a list, in the order of the file."""
@@ -85,11 +87,6 @@ class MapDocument(Contents):
         """Return the record of a list with a key."""
         item = self.lists[list_key].get(key)
         return None if item is None else item.record
-
-    def find_entry(self, key: str) -> str | None:
-        """Return the value of one of the file's own keys, beside the records."""
-        said = self.root.get(key)
-        return said if isinstance(said, str) else None
 
     def _texts(self, sections: Iterable[Section]) -> list[str]:
         texts = list[str]()
@@ -105,19 +102,15 @@ class MapDocument(Contents):
         """Return the file with the map of its waypoints, unless it already names one."""
         if self.map_id is not None or map_id is None:
             return self
-        return self.with_entry("map", map_id)
-
-    def with_entry(self, key: str, value: str) -> "MapDocument":
-        """Return the file with one of its own keys, beside the records, changed."""
-        entry = entry_text(key, value, indent=0)
+        entry = entry_text("map", map_id, indent=0)
         sections = list(self.sections)
-        at = next((i for i, each in enumerate(sections) if each.key == key), None)
+        at = next((i for i, each in enumerate(sections) if each.key == "map"), None)
         if at is not None:
             _, mark, comment = sections[at].head.partition("#")
             behind = f"  {mark}{comment}" if mark else "\n"
-            sections[at] = Section(key=key, head=entry + behind)
+            sections[at] = Section(key="map", head=entry + behind)
             return self._read_again(sections)
-        return self._with_section(Section(key=key, head=f"{entry}\n"), self._find_places())
+        return self._with_section(Section(key="map", head=f"{entry}\n"), self._find_places())
 
     def with_record(self, record: Record, *, former_key: str | None = None) -> "MapDocument":
         """Return the file with a record written, in place of the one with its key if there is one.

@@ -23,7 +23,7 @@ def edited_item(text: str, *, indent: int, old: dict[str, Data], new: dict[str, 
     if not node.flow_style:
         return "".join(_edited_lines(body, node, old, new)) + rest
     line = flow_text(merged_data(data_of(node), old, new))
-    comments = find_comments(body, [node], 0, len(body))
+    comments = find_comments(body)
     return " " * indent + "  ".join([f"- {line}", *comments]) + "\n" + rest
 
 
@@ -46,7 +46,7 @@ def _edited_lines(
             yield text[start : _line_start(text, value.value[0])] + edited
             continue
         stretch, below = split_end(text[start:end], column)
-        found = find_comments(text, [key, value], start, start + len(stretch))
+        found = find_comments(stretch)
         merged = merged_data(said[name], old.get(name), new.get(name))
         yield text[start : key.start_mark.index]
         yield entry_text(name, merged, indent=column, comments="  ".join(found)) + "\n" + below
@@ -79,9 +79,9 @@ def _edited_list(text: str, node: Node, end: int, old: Data, new: Data) -> str |
         data, comments = item, list[str]()
         if source is not None:
             data = merged_data(data_of(node.value[source]), old[source], item)
-            comments = find_comments(text, [node.value[source]], *spans[source])
+            comments = find_comments(text[slice(*spans[source])])
         lines.append("  ".join([f"{margin}- {line_text(data)}", *comments]) + "\n")
-    left = (find_comments(text, [node.value[i]], *spans[i]) for i in gone)
+    left = (find_comments(text[slice(*spans[i])]) for i in gone)
     return "".join([*lines, *(f"{margin}{each}\n" for comments in left for each in comments)])
 
 

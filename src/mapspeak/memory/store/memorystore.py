@@ -98,10 +98,6 @@ class MemoryStore(ABC):
         """Return all events, also those that are over; as `read` otherwise."""
 
     @abstractmethod
-    def read_entry(self, key: str) -> str | None:
-        """Return the entry under one of the memory's own keys, such as `snapshot`; as `read`."""
-
-    @abstractmethod
     def change(
         self,
         change: Callable[[Records], Result],
@@ -214,24 +210,20 @@ def _in_its_frame(waypoint: Waypoint, records: Records) -> Waypoint:
         known = records.find_place(name_key(name))
         if known is None:
             return replace(waypoint, name=name)
-        motion = records.frames.find_transform(of=waypoint.frame, into=known.frame)
-        if motion is not None:
-            is_moved = known.frame != waypoint.frame
-            placed = waypoint.moved(motion) if is_moved else waypoint
-            return replace(placed, name=name, frame=known.frame, room_id=waypoint.room_id)
+        placed = records.frames.bring(waypoint, known.frame)
+        if placed is not None:
+            return replace(placed, name=name, room_id=waypoint.room_id)
     raise AssertionError  # There is always a free number.
 
 
 def _event_in_its_frame(event: Event, known: Event | None, frames: Frames) -> Event:
     """Return an event as a memory keeps it: in the frame of the record with its id."""
-    if known is None or known.frame == event.frame:
-        return event
-    motion = frames.find_transform(of=event.frame, into=known.frame)
-    if motion is None:
+    placed = event if known is None else frames.bring(event, known.frame)
+    if placed is None:
         raise SemanticMapError(
             f"The event {event.id} is of another map.", hint="Note another one for this map."
         )
-    return replace(event.moved(motion), frame=known.frame)
+    return placed
 
 
 def _free_id(known_ids: Iterable[str]) -> str:

@@ -65,10 +65,6 @@ class SemanticMapStore(MemoryStore):
         """Return all events of the file, also those that are over."""
         return cast("tuple[Event, ...]", self._document(self._look()).records_of("events"))
 
-    def read_entry(self, key: str) -> str | None:
-        """Return the value of one of the file's own keys."""
-        return self._document(self._look()).find_entry(key)
-
     def change(
         self,
         change: Callable[[Records], Result],

@@ -5,7 +5,7 @@ Aliases are refused, so that a few lines cannot unfold into gigabytes.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -14,6 +14,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
+from ruamel.yaml.tokens import ScalarToken
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.quoting import quote_name
@@ -208,30 +209,13 @@ def locate(node: Node | None, path: Path) -> tuple[int, int]:
     return node.start_mark.line + 1, node.start_mark.column + 1
 
 
-def find_comments(text: str, nodes: Iterable[Node], start: int, end: int) -> list[str]:
-    """Return the comments in a stretch of text, in their order.
-
-    Args:
-        nodes: The nodes in that stretch.
-    """
-    comments = list[str]()
-    for leaf in (leaf for node in nodes for leaf in _leaves(node)):
-        # What is absent stands for the parser where the next thing begins.
-        leaf_start = min(leaf.start_mark.index, end)
-        comments += _COMMENT.findall(text, start, leaf_start)
-        start = leaf.end_mark.index if isinstance(leaf, ScalarNode) else leaf_start
-        if isinstance(leaf, ScalarNode) and leaf.style in ("|", ">"):
-            comments += _COMMENT.findall(text[leaf_start:start].partition("\n")[0])
-    return comments + _COMMENT.findall(text, start, end)
-
-
-def _leaves(node: Node) -> Iterator[Node]:
-    if isinstance(node, MappingNode):
-        for key, value in node.value:
-            yield from _leaves(key)
-            yield from _leaves(value)
-    elif isinstance(node, SequenceNode):
-        for item in node.value:
-            yield from _leaves(item)
-    else:
-        yield node
+def find_comments(text: str) -> list[str]:
+    """Return the comments in a text, in their order; what a value says is none."""
+    characters = list(text)
+    for token in YAML(typ="safe", pure=True).scan(text):
+        if isinstance(token, ScalarToken):
+            start, end = token.start_mark.index, token.end_mark.index
+            # The first line of a text below its key may end with a comment.
+            start = text.index("\n", start) if token.style in ("|", ">") else start
+            characters[start:end] = " " * (end - start)
+    return _COMMENT.findall("".join(characters))
