@@ -5,11 +5,21 @@ import os
 import signal
 import sys
 import threading
+import time
 from functools import partial
 from pathlib import Path
 
 from mapspeak.evaluation.runs.runner import TrialJob, run_jobs
-from mapspeak.evaluation.trials import Score, Trial, TrialResult, TrialState, write_result
+from mapspeak.evaluation.trials import (
+    TURNS,
+    Score,
+    Trial,
+    TrialResult,
+    TrialState,
+    find_result,
+    trial_folder,
+    write_result,
+)
 
 LOG = "log.txt"
 KILLED = "killed.txt"
@@ -58,6 +68,17 @@ def wait_for_ever() -> None:
     threading.Event().wait(FOR_EVER_S)
 
 
+def talk_until_over(run: Path, trial: Trial, other: Trial) -> None:
+    """Writes turns, the last a while from now, until another trial is over; then succeeds."""
+    turns = trial_folder(run, trial) / TURNS
+    turns.touch()
+    later_s = time.time() + FOR_EVER_S
+    os.utime(turns, (later_s, later_s))
+    while find_result(run, other) is None:
+        os.sched_yield()
+    succeed(run, trial)
+
+
 def kill_run_once(run: Path, trial: Trial, run_pid: int) -> None:
     """Kills the run's process the first time, and succeeds the second."""
     if not (run / KILLED).exists():
@@ -77,7 +98,7 @@ def run_some(run: Path, run_pid: int) -> None:
     works = [partial(succeed, run, trial) for trial in trials]
     works[2] = partial(kill_run_once, run, trials[2], run_pid)
     jobs = [
-        TrialJob(trial=trial, work=work, wall_s=FOR_EVER_S)
+        TrialJob(trial=trial, work=work, silent_s=FOR_EVER_S)
         for trial, work in zip(trials, works, strict=True)
     ]
     run_jobs(run, jobs, n_jobs=1, on_done=ignore)

@@ -104,7 +104,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     type=click.FloatRange(min=1.0),
     default=1200.0,
     show_default=True,
-    help="A trial that takes longer by the wall clock is killed, and the others go on.",
+    help="A trial without a turn for so long by the wall clock is killed; the others go on.",
 )
 @click.option(
     "--retry",

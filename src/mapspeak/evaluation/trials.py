@@ -66,7 +66,7 @@ class Limits:
     """Budget of a trial.
 
     Attributes:
-        wall_s: Wall time; a trial that needs more is killed and counts as hung.
+        wall_s: Wall time after which it is out of budget; infinite for none.
     """
 
     n_calls: int = 60

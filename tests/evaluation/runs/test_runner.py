@@ -37,7 +37,7 @@ def read_result(run: Path, trial: Trial) -> TrialResult:
 
 def run_again(run: Path, trial: Trial, *, has_retry: bool = False) -> None:
     """Runs a trial of which there may be a result, and which succeeds."""
-    job = TrialJob(trial=trial, work=partial(trialworks.succeed, run, trial), wall_s=LONG_S)
+    job = TrialJob(trial=trial, work=partial(trialworks.succeed, run, trial), silent_s=LONG_S)
     run_jobs(run, [job], n_jobs=1, on_done=trialworks.ignore, has_retry=has_retry)
 
 
@@ -52,11 +52,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of five trials, of which one crashes, one is killed and one hangs."""
     run = tmp_path_factory.mktemp("run")
     jobs = [
-        TrialJob(trial=GOOD, work=partial(trialworks.succeed, run, GOOD), wall_s=LONG_S),
-        TrialJob(trial=CRASHING, work=trialworks.raise_error, wall_s=LONG_S),
-        TrialJob(trial=KILLED, work=trialworks.kill_itself, wall_s=LONG_S),
-        TrialJob(trial=HANGING, work=trialworks.wait_for_ever, wall_s=0.5),
-        TrialJob(trial=LAST, work=partial(trialworks.succeed, run, LAST), wall_s=LONG_S),
+        TrialJob(trial=GOOD, work=partial(trialworks.succeed, run, GOOD), silent_s=LONG_S),
+        TrialJob(trial=CRASHING, work=trialworks.raise_error, silent_s=LONG_S),
+        TrialJob(trial=KILLED, work=trialworks.kill_itself, silent_s=LONG_S),
+        TrialJob(trial=HANGING, work=trialworks.wait_for_ever, silent_s=0.5),
+        TrialJob(trial=LAST, work=partial(trialworks.succeed, run, LAST), silent_s=LONG_S),
     ]
     run_jobs(run, jobs, n_jobs=2, on_done=trialworks.ignore)
     return run
@@ -77,6 +77,19 @@ def test_a_process_that_was_killed_counts_as_crashed_and_names_the_signal(run: P
 
 def test_a_trial_that_hangs_is_killed_and_says_so(run: Path) -> None:
     assert read_result(run, HANGING).state is TrialState.HUNG
+
+
+def test_a_trial_whose_agent_still_calls_is_not_killed(
+    tmp_path: Path,
+) -> None:
+    talking = partial(trialworks.talk_until_over, tmp_path, GOOD, HANGING)
+    jobs = [
+        TrialJob(trial=GOOD, work=talking, silent_s=0.5),
+        TrialJob(trial=HANGING, work=trialworks.wait_for_ever, silent_s=0.5),
+    ]
+    run_jobs(tmp_path, jobs, n_jobs=2, on_done=trialworks.ignore)
+    assert read_result(tmp_path, GOOD).state is TrialState.FINISHED
+    assert read_result(tmp_path, HANGING).state is TrialState.HUNG
 
 
 def test_broken_trials_cost_the_others_nothing(run: Path) -> None:
@@ -102,7 +115,7 @@ def test_a_run_that_was_killed_goes_on_without_repeating_what_is_done(tmp_path: 
 def test_results_that_are_there_are_told_again(tmp_path: Path) -> None:
     trialworks.succeed(tmp_path, GOOD)
     told: list[TrialResult] = []
-    job = TrialJob(trial=GOOD, work=trialworks.raise_error, wall_s=LONG_S)
+    job = TrialJob(trial=GOOD, work=trialworks.raise_error, silent_s=LONG_S)
     run_jobs(tmp_path, [job], n_jobs=1, on_done=told.append)
     assert [result.score.is_success for result in told] == [True]
 
@@ -110,9 +123,12 @@ def test_results_that_are_there_are_told_again(tmp_path: Path) -> None:
 def test_a_trial_waits_for_the_one_it_starts_from(tmp_path: Path) -> None:
     jobs = [
         TrialJob(
-            trial=LAST, work=partial(trialworks.succeed, tmp_path, LAST), after=GOOD, wall_s=LONG_S
+            trial=LAST,
+            work=partial(trialworks.succeed, tmp_path, LAST),
+            after=GOOD,
+            silent_s=LONG_S,
         ),
-        TrialJob(trial=GOOD, work=partial(trialworks.succeed, tmp_path, GOOD), wall_s=LONG_S),
+        TrialJob(trial=GOOD, work=partial(trialworks.succeed, tmp_path, GOOD), silent_s=LONG_S),
     ]
     run_jobs(tmp_path, jobs, n_jobs=2, on_done=trialworks.ignore)
     assert (tmp_path / trialworks.LOG).read_text().splitlines() == [GOOD.id, LAST.id]
@@ -120,9 +136,12 @@ def test_a_trial_waits_for_the_one_it_starts_from(tmp_path: Path) -> None:
 
 def test_a_trial_whose_preparation_broke_is_broken_too(tmp_path: Path) -> None:
     jobs = [
-        TrialJob(trial=GOOD, work=trialworks.raise_error, wall_s=LONG_S),
+        TrialJob(trial=GOOD, work=trialworks.raise_error, silent_s=LONG_S),
         TrialJob(
-            trial=LAST, work=partial(trialworks.succeed, tmp_path, LAST), after=GOOD, wall_s=LONG_S
+            trial=LAST,
+            work=partial(trialworks.succeed, tmp_path, LAST),
+            after=GOOD,
+            silent_s=LONG_S,
         ),
     ]
     run_jobs(tmp_path, jobs, n_jobs=2, on_done=trialworks.ignore)
@@ -130,7 +149,7 @@ def test_a_trial_whose_preparation_broke_is_broken_too(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_ends_the_run_and_is_nobodys_result(tmp_path: Path) -> None:
-    jobs = [TrialJob(trial=GOOD, work=trialworks.fill_the_disk, wall_s=LONG_S)]
+    jobs = [TrialJob(trial=GOOD, work=trialworks.fill_the_disk, silent_s=LONG_S)]
     with pytest.raises(ConfigError, match="the disk is full"):
         run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
     assert find_result(tmp_path, GOOD) is None
@@ -138,7 +157,7 @@ def test_a_full_disk_ends_the_run_and_is_nobodys_result(tmp_path: Path) -> None:
 
 def test_an_interrupt_is_for_the_run_and_not_for_its_trials(tmp_path: Path) -> None:
     work = partial(trialworks.succeed_after_an_interrupt, tmp_path, GOOD)
-    jobs = [TrialJob(trial=GOOD, work=work, wall_s=LONG_S)]
+    jobs = [TrialJob(trial=GOOD, work=work, silent_s=LONG_S)]
     run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
     assert read_result(tmp_path, GOOD).score.is_success
 

@@ -32,7 +32,7 @@ class RunOptions:
         n_trials: Per task and world; a world is explored once.
         seed: Of the first trial; each further one has the next.
         thinking: Level of thinking of models; None if not set. Scripts run once.
-        hang_s: Wall time after which a trial's process is killed.
+        hang_s: Wall time without a turn after which a trial's process is killed.
         has_retry: Run trials again that crashed or hung.
 
     Raises:

@@ -31,6 +31,7 @@ from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan, plan_run, prepare_world
 from mapspeak.evaluation.tasks.catalogue import EXPLORE, find_task
 from mapspeak.evaluation.trials import (
+    TURNS,
     Failure,
     Score,
     Trial,
@@ -67,13 +68,13 @@ class TrialJob:
     Attributes:
         work: Carries it out and writes its result; called in its own process.
         after: A trial that must finish before; None for none.
-        wall_s: Time after which its process is killed.
+        silent_s: Wall time after its last turn, or its start, at which its process is killed.
     """
 
     trial: Trial
     work: Callable[[], object]
     after: Trial | None = None
-    wall_s: float
+    silent_s: float
 
 
 def make_jobs(
@@ -91,7 +92,7 @@ def make_jobs(
         needs_map = find_task(trial.task).needs_map
         before = prepare_world(options, trial.world) if needs_map else None
         work = partial(attempt, options.folder, trial, worlds[trial.world], before)
-        yield TrialJob(trial=trial, work=work, after=before, wall_s=options.hang_s)
+        yield TrialJob(trial=trial, work=work, after=before, silent_s=options.hang_s)
 
 
 def _floor_m2(world: World) -> float:
@@ -168,7 +169,13 @@ def _lock(folder: Path) -> AbstractContextManager[object]:
 class _Running:
     job: TrialJob
     process: BaseProcess
-    ends_s: float
+    begun_s: float
+
+    def left_s(self, run: Path) -> float:
+        """Return the wall time left until it has been silent for too long."""
+        turns = trial_folder(run, self.job.trial) / TURNS
+        heard_s = turns.stat().st_mtime if turns.exists() else self.begun_s
+        return max(heard_s, self.begun_s) + self.job.silent_s - time.time()
 
 
 def run_jobs(
@@ -280,25 +287,24 @@ def _start(run: Path, job: TrialJob, processes: BaseContext) -> _Running:
         target=_work_apart, args=(job.work, folder / ERRORS), daemon=False
     )
     process.start()
-    return _Running(job, process, time.monotonic() + job.wall_s)
+    return _Running(job, process, time.time())
 
 
 def _await_some(run: Path, running: list[_Running]) -> Iterator[TrialResult]:
     """Wait until a process has ended or has to be ended, and yield what became of it."""
     if not running:
         return
-    next_s = min(each.ends_s for each in running)
-    left_s = max(next_s - time.monotonic(), 0.0)
-    wait([each.process.sentinel for each in running], timeout=left_s)
+    next_s = min(each.left_s(run) for each in running)
+    wait([each.process.sentinel for each in running], timeout=max(next_s, 0.0))
     for each in list(running):
         if not each.process.is_alive():
             each.process.join()
             running.remove(each)
             yield _settle(run, each)
-        elif time.monotonic() >= each.ends_s:
+        elif each.left_s(run) <= 0.0:
             _kill([each])
             running.remove(each)
-            said = f"It was killed after {each.job.wall_s:.0f} s of wall time."
+            said = f"It was killed after {each.job.silent_s:.0f} s without a turn."
             yield _write_broken(run, each.job, TrialState.HUNG, said)
 
 
