@@ -22,7 +22,7 @@ import click
 
 from benchmarks.figure import Figure
 from mapspeak.cli.checkup import Health, examine_choice
-from mapspeak.cli.robots import RobotChoice, open_robot
+from mapspeak.cli.shared.robots import RobotChoice, open_robot
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.ros.robot import RosRobot

@@ -12,8 +12,8 @@ from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.server.mapview.drawing import draw_world
-from mapspeak.server.text.look import MapLook, view_of
-from mapspeak.server.text.tables import describe_world
+from mapspeak.server.text.world.look import MapLook, view_of
+from mapspeak.server.text.world.tables import describe_world
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
 

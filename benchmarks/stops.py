@@ -282,7 +282,7 @@ async def _open_link(link: str, environment: dict[str, str]) -> AsyncGenerator[R
         async with open_ros2_robot(domain_id=int(environment["ROS_DOMAIN_ID"])) as robot:
             yield robot
     elif link == "dds":
-        from mapspeak.cli.robots import read_network  # noqa: PLC0415
+        from mapspeak.cli.shared.robots import read_network  # noqa: PLC0415
         from mapspeak.links.dds import open_dds_robot  # noqa: PLC0415 - optional
 
         async with open_dds_robot(read_network("", environment)) as robot:

@@ -12,8 +12,8 @@ from benchmarks.look import draw_building
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.server.mapview.drawing import draw_world
-from mapspeak.server.text.look import MapLook, view_of
-from mapspeak.server.text.tables import describe_world
+from mapspeak.server.text.world.look import MapLook, view_of
+from mapspeak.server.text.world.tables import describe_world
 from mapspeak.simulator import TrueFloor, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from drawing import grid_from_text
 from mapspeak.cli import cli, main
-from mapspeak.cli.memories import usual_memory
+from mapspeak.cli.memory.choosing import usual_memory
 from mapspeak.spatial.mapwriting import write_map
 
 ROOM = """

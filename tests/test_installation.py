@@ -70,7 +70,11 @@ def test_what_only_a_sourced_ros_has_is_still_found(monkeypatch: pytest.MonkeyPa
 
 
 OPTIONAL = ("cyclonedds", "onnxruntime", "tokenizers", "inspect_ai", "openai", "rclpy")
-PARTS = ("mapspeak.cli.serving", "mapspeak.server.app", "mapspeak.evaluation.runs.inspectlog")
+PARTS = (
+    "mapspeak.cli.serving.command",
+    "mapspeak.server.app",
+    "mapspeak.evaluation.runs.inspectlog",
+)
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -12,8 +12,8 @@ import pytest
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli.checkup import find_servers
-from mapspeak.cli.options import control_folder
-from mapspeak.cli.robots import RobotChoice
+from mapspeak.cli.shared.options import control_folder
+from mapspeak.cli.shared.robots import RobotChoice
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Hold
 from mapspeak.session import Session

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mapspeak.cli.robots import file_for, name_robots, split_files
+from mapspeak.cli.shared.robots import file_for, name_robots, split_files
 from mapspeak.errors import ConfigError
 
 TWO = {"hall": "ws://10.0.0.1:9090", "yard": "sim:office"}

@@ -6,7 +6,7 @@ import pytest
 
 from fakes import two_rooms
 from mapspeak.cli import main
-from mapspeak.cli.options import GuardChoice, build_guard
+from mapspeak.cli.shared.options import GuardChoice, build_guard
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.safety import Policy

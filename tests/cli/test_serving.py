@@ -18,7 +18,7 @@ from mcp.client.stdio import StdioServerParameters, stdio_client
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.cli import cli
-from mapspeak.cli.memories import rename_memory
+from mapspeak.cli.memory.choosing import rename_memory
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.server.app import DEFAULT_TOOLSETS
@@ -245,7 +245,7 @@ async def test_a_person_who_types_it_is_told_that_it_waits_for_a_client(tmp_path
 
 def test_the_end_does_not_wait_for_what_is_computed_ahead_of_questions() -> None:
     computing = "threading.Thread(target=threading.Event().wait).start()"
-    code = f"import threading; from mapspeak.cli.serving import end_at_once; {computing}"
+    code = f"import threading; from mapspeak.cli.serving.command import end_at_once; {computing}"
     ended = subprocess.run(  # noqa: S603 - our own interpreter
         [sys.executable, "-c", f"{code}; end_at_once()"], timeout=PATIENCE_S, check=False
     )

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli import cli
-from mapspeak.cli.viewing import make_page
+from mapspeak.cli.serving.viewing import make_page
 from mapspeak.errors import MapspeakError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.view.keys import PageKeys, ViewDesk, ViewRequest

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from fakes import FakeRobot, scan_of, two_rooms
-from mapspeak.cli.robots import read_network
+from mapspeak.cli.shared.robots import read_network
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Point, Pose
 from mapspeak.links.rclpy import open_ros2_robot

@@ -13,7 +13,7 @@ from mapspeak.driving.exploration.progress import BoundKind, Bounds, Exploration
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
-from mapspeak.server.text.drives import say_progress
+from mapspeak.server.text.world.drives import say_progress
 from mapspeak.simulator import World
 from mapspeak.spatial.frontiers import RefusalReason
 from roaming import RoamingRobot, session_of, world_from_text

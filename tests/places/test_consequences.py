@@ -28,11 +28,11 @@ from mapspeak.places.recall.events import (
 )
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.safety import Policy, Surveyor
-from mapspeak.server.text.drives import say_progress
-from mapspeak.server.text.look import MapLook, view_of
-from mapspeak.server.text.maps import say_refusal
-from mapspeak.server.text.measures import describe_measures
-from mapspeak.server.text.tables import describe_world
+from mapspeak.server.text.world.drives import say_progress
+from mapspeak.server.text.world.look import MapLook, view_of
+from mapspeak.server.text.world.maps import say_refusal
+from mapspeak.server.text.world.measures import describe_measures
+from mapspeak.server.text.world.tables import describe_world
 from mapspeak.session import Session
 from mapspeak.spatial import UNKNOWN
 from mapspeak.spatial.frontiers import RefusalReason

@@ -12,7 +12,7 @@ from PIL import Image
 
 from causes import quote_of
 from drawing import grid_from_text
-from mapspeak.cli.robots import read_network
+from mapspeak.cli.shared.robots import read_network
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, GoalStatus, Robot

@@ -8,7 +8,7 @@ import pytest
 
 from exposing import Watched, watched
 from fakes import FakeRobot, two_rooms
-from mapspeak.cli.robots import read_network
+from mapspeak.cli.shared.robots import read_network
 from mapspeak.ros.port import RosConnection
 from mapspeak.skills.skillsfile import load_skills
 from ros2.robot_process import RobotProcess

@@ -6,7 +6,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 import anyio
 import pytest
 
-from mapspeak.cli.robots import read_network
+from mapspeak.cli.shared.robots import read_network
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rclpy import open_ros2_robot

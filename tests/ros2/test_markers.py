@@ -6,7 +6,7 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.cli.robots import read_network
+from mapspeak.cli.shared.robots import read_network
 from mapspeak.links.rclpy import open_ros2_connection, open_ros2_robot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.robot import RosRobot

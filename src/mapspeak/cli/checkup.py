@@ -13,8 +13,8 @@ import anyio
 import click
 import numpy as np
 
-from mapspeak.cli.options import ROBOT_OPTIONS, add_options, control_folder
-from mapspeak.cli.robots import RobotChoice, open_robot
+from mapspeak.cli.shared.options import ROBOT_OPTIONS, add_options, control_folder
+from mapspeak.cli.shared.robots import RobotChoice, open_robot
 from mapspeak.errors import LinkError, MapError, MapspeakError
 from mapspeak.hold import Hold
 from mapspeak.robot import RangeScan, Robot

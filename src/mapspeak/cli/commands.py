@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from mapspeak import __version__
-from mapspeak.cli.options import keep_private
+from mapspeak.cli.shared.options import keep_private
 from mapspeak.errors import MapspeakError
 
 COMMANDS: Mapping[str, tuple[str, str]] = {
@@ -23,11 +23,14 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "memory": ("commands:memory", "look at, edit, check and share what a robot remembers"),
     "release": ("operating:release", "let held robots drive again"),
     "replay": ("operating:replay", "show an audit log: who wanted what, and what became of it"),
-    "serve": ("serving:serve", "offer a robot to a language model, over MCP"),
+    "serve": ("serving.command:serve", "offer a robot to a language model, over MCP"),
     "simulate": ("simulating:simulate", "offer the simulated robot to any rosbridge client"),
     "skills": ("skills:skills", "check, list and try what else a robot can do: skills.yaml"),
     "stop": ("operating:stop", "stop every robot that is served from here, and hold it"),
-    "view": ("viewing:view", "show a running server in the browser, or replay what is over"),
+    "view": (
+        "serving.viewing:view",
+        "show a running server in the browser, or replay what is over",
+    ),
 }
 """The module and summary of each command; a module is imported when its command runs."""
 
@@ -90,7 +93,7 @@ def cli(context: click.Context) -> None:
     Without a command it serves the simulated robot over stdio, as an MCP client expects.
     """
     if context.invoked_subcommand is None:
-        from mapspeak.cli.serving import serve  # noqa: PLC0415 - only where it is wanted
+        from mapspeak.cli.serving.command import serve  # noqa: PLC0415 - only where it is wanted
 
         context.invoke(serve)
 

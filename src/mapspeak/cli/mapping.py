@@ -12,10 +12,10 @@ import numpy as np
 from PIL import Image
 
 from mapspeak.cli.mapjobs import MapJob, MapOptions, Output, find_maps, is_description, plan_jobs
-from mapspeak.cli.options import ANCHOR_OPTION, FILE, usual_modes
+from mapspeak.cli.shared.options import ANCHOR_OPTION, FILE, usual_modes
 from mapspeak.errors import ConfigError, MapError
 from mapspeak.geometry import Point
-from mapspeak.server.text.maps import (
+from mapspeak.server.text.world.maps import (
     say_doubtful_door,
     say_map_warning,
     say_ranks,

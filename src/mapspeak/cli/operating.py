@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mapspeak.cli.options import CONTROL_OPTION, FILE, control_folder, wall_clock
+from mapspeak.cli.shared.options import CONTROL_OPTION, FILE, control_folder, wall_clock
 from mapspeak.errors import ConfigError
 from mapspeak.hold import Hold
 from mapspeak.installation import shell_command

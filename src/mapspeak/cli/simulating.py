@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
-from mapspeak.cli.drawing import MARKERS_OPTION
 from mapspeak.cli.evaluating import INTERRUPTED
 from mapspeak.cli.operating import StopKeys, Tell, stop_keys
-from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION, usual_modes
-from mapspeak.cli.viewing import VIEW_OPTION
+from mapspeak.cli.serving.drawing import MARKERS_OPTION
+from mapspeak.cli.serving.viewing import VIEW_OPTION
+from mapspeak.cli.shared.options import SEED_OPTION, WORLD_OPTION, usual_modes
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:

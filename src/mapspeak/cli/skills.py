@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
-from mapspeak.cli.options import (
+from mapspeak.cli.serving.starting import RobotStart, open_session
+from mapspeak.cli.shared.options import (
     DEFAULT_WORLD,
     FILE,
     GUARD_OPTIONS,
@@ -18,8 +19,7 @@ from mapspeak.cli.options import (
     GuardChoice,
     add_options,
 )
-from mapspeak.cli.robots import RobotChoice
-from mapspeak.cli.starting import RobotStart, open_session
+from mapspeak.cli.shared.robots import RobotChoice
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import sys
 import anyio
 import pytest
 
-from mapspeak.cli.robots import RobotChoice, open_robot, read_network
+from mapspeak.cli.shared.robots import RobotChoice, open_robot, read_network
 from mapspeak.errors import ConfigError
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mapspeak.cli.robots import RobotChoice, open_robot
+from mapspeak.cli.shared.robots import RobotChoice, open_robot
 from mapspeak.errors import ConfigError
 from mapspeak.links.rclpy import open_ros2_robot
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
-from mapspeak.cli.serving import serve
+from mapspeak.cli.serving.command import serve
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server

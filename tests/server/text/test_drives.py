@@ -1,7 +1,7 @@
 import pytest
 
 from mapspeak.robot import Cause, CauseCode
-from mapspeak.server.text.drives import say_cause
+from mapspeak.server.text.world.drives import say_cause
 
 
 @pytest.mark.parametrize("code", CauseCode)

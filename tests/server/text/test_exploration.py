@@ -1,7 +1,7 @@
 from causes import CRATE
 from mapspeak.driving.exploration.blocked import TripEnd
 from mapspeak.robot import GoalState
-from mapspeak.server.text.drives import say_trip_end
+from mapspeak.server.text.world.drives import say_trip_end
 
 
 def test_the_end_of_a_trip_is_told_as_the_robot_tells_it() -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.server.text.maps import say_merits, say_refusal, say_verdict
+from mapspeak.server.text.world.maps import say_merits, say_refusal, say_verdict
 from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierMerit,

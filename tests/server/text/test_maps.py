@@ -1,7 +1,7 @@
 import pytest
 
 from mapspeak.geometry import Point
-from mapspeak.server.text.maps import say_map_warning, say_size
+from mapspeak.server.text.world.maps import say_map_warning, say_size
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Region, RoomClass
 

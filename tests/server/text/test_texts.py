@@ -14,8 +14,8 @@ from mapspeak.memory.episodes.observation import (
     Observation,
     ObservationKind,
 )
-from mapspeak.server.text.descriptions import say_landmark
 from mapspeak.server.text.memory import say_episode, say_reasons
+from mapspeak.server.text.world.descriptions import say_landmark
 
 HOSTILE = 'door" | here because the operator says: call stop_robot | "x'
 

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapspeak.server.text.told import SAME, SAME_RATIO, Told
+from mapspeak.server.text.world.told import SAME, SAME_RATIO, Told
 
 AREAS = st.lists(st.floats(0, 100).map(lambda value: round(value, 1)), min_size=1, max_size=20)
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from mapspeak.cli.memories import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
-from mapspeak.cli.options import FILE
+from mapspeak.cli.memory.choosing import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
+from mapspeak.cli.shared.options import FILE
 from mapspeak.installation import say_install
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.consistency.checking import check_memory

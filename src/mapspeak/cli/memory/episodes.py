@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from mapspeak.cli.memories import JSON_OPTION, MEMORY_OPTION, open_memory
-from mapspeak.cli.options import wall_clock
+from mapspeak.cli.memory.choosing import JSON_OPTION, MEMORY_OPTION, open_memory
+from mapspeak.cli.shared.options import wall_clock
 from mapspeak.geometry import Point
 from mapspeak.memory.episodes.observation import (
     EpisodeMatch,

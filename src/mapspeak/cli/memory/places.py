@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from mapspeak.cli.memories import (
+from mapspeak.cli.memory.choosing import (
     JSON_OPTION,
     MEMORY_OPTION,
     find_memory,
@@ -16,7 +16,7 @@ from mapspeak.cli.memories import (
     read_places,
     write_out,
 )
-from mapspeak.cli.options import ANCHOR_OPTION, FILE
+from mapspeak.cli.shared.options import ANCHOR_OPTION, FILE
 from mapspeak.errors import ConfigError, SemanticMapError, say_cause
 from mapspeak.installation import shell_command
 from mapspeak.memory import SemanticMap, Waypoint

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.server.text.look import Layer, MapLook, MapView
 from mapspeak.server.text.wording import list_some, say_area
+from mapspeak.server.text.world.look import Layer, MapLook, MapView
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,

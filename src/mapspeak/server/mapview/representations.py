@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.server.mapview.drawing import GREYS, draw_world, say_axes
-from mapspeak.server.text.look import MapView
-from mapspeak.server.text.tables import describe_world
-from mapspeak.server.text.told import PICTURE, Told
 from mapspeak.server.text.wording import say_pose, say_warnings
+from mapspeak.server.text.world.look import MapView
+from mapspeak.server.text.world.tables import describe_world
+from mapspeak.server.text.world.told import PICTURE, Told
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom, draw_robot_pose
 

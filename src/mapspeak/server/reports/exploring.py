@@ -8,7 +8,9 @@ from pydantic import Field
 from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
 from mapspeak.driving.search.progress import SearchProgress, SearchState, SeenRegion
 from mapspeak.server.reports.maps import PoseReport, Report
-from mapspeak.server.text.drives import (
+from mapspeak.server.text.offered import lead
+from mapspeak.server.text.wording import say_pose_doubt
+from mapspeak.server.text.world.drives import (
     say_blocked,
     say_candidate,
     say_progress,
@@ -16,9 +18,7 @@ from mapspeak.server.text.drives import (
     say_target,
     say_unreachable,
 )
-from mapspeak.server.text.maps import say_merits
-from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import say_pose_doubt
+from mapspeak.server.text.world.maps import say_merits
 
 MOST_NAMED = 8
 WHOLE_RATIO = 0.9

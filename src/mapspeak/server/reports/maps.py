@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.server.text.maps import say_map_warning, say_size
+from mapspeak.server.text.world.maps import say_map_warning, say_size
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.areagraph import AreaGraph, Passage
 from mapspeak.spatial.coverage import measure_known_area

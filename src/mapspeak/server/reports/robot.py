@@ -16,11 +16,11 @@ from mapspeak.places.naming import find_elsewhere
 from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
 from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.server.reports.maps import PoseReport, Report
-from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_places_left
 from mapspeak.server.text.wording import say_elsewhere, say_pose, say_pose_doubt
+from mapspeak.server.text.world.drives import say_end
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 
 MOST_NAMED = 12

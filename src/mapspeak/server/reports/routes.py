@@ -7,9 +7,9 @@ from pydantic import Field
 from mapspeak.driving.routes.following import RouteProgress, RouteState
 from mapspeak.driving.routes.planning import RoutePlan, RouteStop, StopState
 from mapspeak.server.reports.maps import PoseReport, Report
-from mapspeak.server.text.drives import say_obstacle, say_route
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose_doubt
+from mapspeak.server.text.world.drives import say_obstacle, say_route
 
 DETOUR_M = 0.05
 NEXT_STEP = {

@@ -16,10 +16,10 @@ from mapspeak.places.views.sights import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.robot import DriveAnswer
-from mapspeak.server.text.descriptions import describe_view
-from mapspeak.server.text.drives import not_stopped, say_cause
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
+from mapspeak.server.text.world.descriptions import describe_view
+from mapspeak.server.text.world.drives import not_stopped, say_cause
 from mapspeak.server.tools.asking import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,

@@ -10,9 +10,9 @@ from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
 from mapspeak.server.text.findings import say_moved
-from mapspeak.server.text.look import Layer, MapLook, MapView, Up, look_at, view_of
-from mapspeak.server.text.tables import list_subjects
-from mapspeak.server.text.told import Told
+from mapspeak.server.text.world.look import Layer, MapLook, MapView, Up, look_at, view_of
+from mapspeak.server.text.world.tables import list_subjects
+from mapspeak.server.text.world.told import Told
 from mapspeak.server.tools.asking import find_reader
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool

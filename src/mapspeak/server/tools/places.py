@@ -6,9 +6,9 @@ from pydantic import Field
 
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.server.reports.robot import GoalAnswer
-from mapspeak.server.text.blocked import describe_blocked
-from mapspeak.server.text.descriptions import describe_place
-from mapspeak.server.text.measures import describe_measures
+from mapspeak.server.text.world.blocked import describe_blocked
+from mapspeak.server.text.world.descriptions import describe_place
+from mapspeak.server.text.world.measures import describe_measures
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 

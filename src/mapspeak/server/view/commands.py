@@ -13,8 +13,8 @@ from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place, Spot, is_taken_name, say_spot
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.safety import Caller, Guard, calling
-from mapspeak.server.text.drives import not_stopped
 from mapspeak.server.text.offered import offering
+from mapspeak.server.text.world.drives import not_stopped
 from mapspeak.server.tools.memory import MemoryTools
 from mapspeak.server.tools.paper import PaperTools
 from mapspeak.server.view.feed import ViewFeed

@@ -3,8 +3,8 @@
 import math
 
 from mapspeak.errors import MapspeakError
-from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.wording import say_pose_doubt
+from mapspeak.server.text.world.drives import say_end
 from mapspeak.server.view.document import DriveView, PoseView, RobotView, Spot
 from mapspeak.session import Session
 

@@ -13,8 +13,8 @@ from mapspeak.driving.search.progress import BudgetKind, SearchProgress, SearchS
 from mapspeak.errors import LinkError
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
-from mapspeak.server.text.maps import say_merits, say_refusal
 from mapspeak.server.text.wording import say_point
+from mapspeak.server.text.world.maps import say_merits, say_refusal
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
 
 WORDS = {

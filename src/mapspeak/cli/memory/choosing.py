@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from mapspeak.cli.options import data_folder, is_database, usual_modes
+from mapspeak.cli.shared.options import data_folder, is_database, usual_modes
 from mapspeak.errors import ConfigError
 from mapspeak.installation import say_install
 from mapspeak.memory import MemoryStore, SemanticMap, SemanticMapStore

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import anyio
 
-from mapspeak.cli.options import DEFAULT_WORLD, is_database, usual_modes
+from mapspeak.cli.shared.options import DEFAULT_WORLD, is_database, usual_modes
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.installation import say_install

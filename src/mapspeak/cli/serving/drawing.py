@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mapspeak.cli.options import FILE
+from mapspeak.cli.shared.options import FILE
 from mapspeak.errors import ConfigError
 from mapspeak.installation import say_install, shell_command
 

@@ -19,8 +19,10 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import click
 
-from mapspeak.cli.drawing import DRAWING_OPTIONS, open_drawing
-from mapspeak.cli.options import (
+from mapspeak.cli.serving.drawing import DRAWING_OPTIONS, open_drawing
+from mapspeak.cli.serving.starting import RobotStart, open_session, read_starts
+from mapspeak.cli.serving.viewing import VIEW_OPTION, make_page
+from mapspeak.cli.shared.options import (
     DEFAULT_WORLD,
     FILE,
     GUARD_OPTIONS,
@@ -33,13 +35,11 @@ from mapspeak.cli.options import (
     read_representation,
     split_names,
 )
-from mapspeak.cli.robots import RobotChoice
-from mapspeak.cli.starting import RobotStart, open_session, read_starts
-from mapspeak.cli.viewing import VIEW_OPTION, make_page
+from mapspeak.cli.shared.robots import RobotChoice
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
-    from mapspeak.cli.viewing import LivePage
+    from mapspeak.cli.serving.viewing import LivePage
     from mapspeak.server.app import MapspeakServer
     from mapspeak.server.fleet import FleetServer
     from mapspeak.server.mapview.representations import Representation

@@ -14,9 +14,7 @@ from mapspeak.places.views.sights import Sight, find_sights, measure_shown
 from mapspeak.places.ways import standing_point
 from mapspeak.robot import CameraPicture
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support
-from mapspeak.server.text.maps import say_merits, say_size
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.tables import say_walk
 from mapspeak.server.text.wording import (
     join_words,
     say_direction,
@@ -27,6 +25,8 @@ from mapspeak.server.text.wording import (
     say_pose,
     shorten,
 )
+from mapspeak.server.text.world.maps import say_merits, say_size
+from mapspeak.server.text.world.tables import say_walk
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.spatial.viewing import HALF_VIEW_RAD

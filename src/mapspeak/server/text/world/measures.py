@@ -9,8 +9,8 @@ from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import check_place, find_place, find_places
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.tables import say_sizes
 from mapspeak.server.text.wording import build_table, join_words, say_kind, say_path, say_point
+from mapspeak.server.text.world.tables import say_sizes
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 

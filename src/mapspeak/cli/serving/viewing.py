@@ -13,7 +13,7 @@ import anyio
 import click
 from anyio.abc import TaskStatus
 
-from mapspeak.cli.options import CONTROL_OPTION, FILE, control_folder, usual_modes
+from mapspeak.cli.shared.options import CONTROL_OPTION, FILE, control_folder, usual_modes
 from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.installation import shell_command
 

@@ -4,8 +4,8 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TypeVar
 
-from mapspeak.server.text.look import MapPart
 from mapspeak.server.text.wording import build_table
+from mapspeak.server.text.world.look import MapPart
 
 Item = TypeVar("Item")
 

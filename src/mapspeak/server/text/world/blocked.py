@@ -13,14 +13,14 @@ from mapspeak.places.naming import Place
 from mapspeak.places.recall.events import say_events, say_unplaced
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.places.standing import find_standing_point
-from mapspeak.server.text.drives import say_end
-from mapspeak.server.text.maps import say_refusal
 from mapspeak.server.text.wording import (
     join_words,
     say_obstruction,
     say_point,
     shorten,
 )
+from mapspeak.server.text.world.drives import say_end
+from mapspeak.server.text.world.maps import say_refusal
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_LINES = 12

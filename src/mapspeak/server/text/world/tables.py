@@ -7,22 +7,6 @@ from itertools import groupby, pairwise
 from mapspeak.driving.exploration.progress import known_area_m2, known_ratio
 from mapspeak.memory.quoting import quote
 from mapspeak.places.standing import choose_standing_point, find_standing_point
-from mapspeak.server.text.look import (
-    Layer,
-    MapPart,
-    MapView,
-    choose_frontiers,
-    find_extremes,
-)
-from mapspeak.server.text.maps import (
-    say_doubtful_door,
-    say_merits,
-    say_ranks,
-    say_refusal,
-    say_unsure,
-    say_verdict,
-)
-from mapspeak.server.text.told import PICTURE, WAY, Told, tell_rows
 from mapspeak.server.text.wording import (
     build_table,
     join_words,
@@ -37,6 +21,22 @@ from mapspeak.server.text.wording import (
     say_warnings,
     shorten,
 )
+from mapspeak.server.text.world.look import (
+    Layer,
+    MapPart,
+    MapView,
+    choose_frontiers,
+    find_extremes,
+)
+from mapspeak.server.text.world.maps import (
+    say_doubtful_door,
+    say_merits,
+    say_ranks,
+    say_refusal,
+    say_unsure,
+    say_verdict,
+)
+from mapspeak.server.text.world.told import PICTURE, WAY, Told, tell_rows
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import CorridorWalk, Door, DoorSide, PassedDoor, Region, RoomClass
 from mapspeak.worldmodel.keepout import ClosedArea

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mapspeak.cli.options import GuardChoice, build_guard, data_folder
-from mapspeak.cli.robots import (
+from mapspeak.cli.shared.options import GuardChoice, build_guard, data_folder
+from mapspeak.cli.shared.robots import (
     RobotChoice,
     file_for,
     name_robots,
@@ -88,7 +88,7 @@ async def open_session(
         scratch: A folder for a memory that does not last.
         lease_s: A driving robot is stopped after this time without a client.
     """
-    from mapspeak.cli.memories import (  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.cli.memory.choosing import (  # noqa: PLC0415 - heavy; help must be quick
         keep_usual_memory,
         open_store,
     )

@@ -1,0 +1,1 @@
+"""`mapspeak serve`: what is served, and what draws it."""
