@@ -74,10 +74,10 @@ class RovingRobot(SoloRobot):
         self._grid = replace(self._grid, cells=cells)
         return self._grid
 
-    async def fetch_picture(self) -> CameraPicture:
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
         """Return a picture that is there already, as a real camera sends it."""
         if self._picture is None:
-            self._picture = await super().fetch_picture()
+            self._picture = await super().fetch_picture(camera)
         return self._picture
 
     async def stop(self) -> None:

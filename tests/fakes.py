@@ -77,7 +77,7 @@ class FakeRobot:
     ) -> None:
         self.grid = grid
         self.pose = pose
-        self.has_camera = has_camera
+        self.cameras: tuple[str, ...] = ("front",) if has_camera else ()
         self.is_radius_assumed = False
         self.detections: tuple[Detection, ...] = ()
         self.scan: RangeScan | None = None
@@ -97,7 +97,7 @@ class FakeRobot:
             name="fake robot",
             radius_m=0.2,
             map_name="two-rooms",
-            has_camera=self.has_camera,
+            cameras=self.cameras,
             has_laser=self.scan is not None,
             detector="fake detector" if self.detections else None,
             is_radius_assumed=self.is_radius_assumed,
@@ -125,9 +125,10 @@ class FakeRobot:
     async def fetch_pose(self) -> StampedPose:
         return StampedPose(self.pose, self._now_s)
 
-    async def fetch_picture(self) -> CameraPicture:
-        if not self.has_camera:
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+        if not self.cameras:
             raise LinkError("This robot has no camera.", hint="Use look_at_map instead.")
+        is_ahead = camera is None or self.description.find_camera(camera) == self.cameras[0]
         encoded = io.BytesIO()
         Image.new("RGB", (64, 48), "grey").save(encoded, format="JPEG")
         return CameraPicture(
@@ -135,8 +136,8 @@ class FakeRobot:
             media_type="image/jpeg",
             width_px=64,
             height_px=48,
-            horizontal_fov_rad=math.radians(90),
-            pose=self.pose,
+            horizontal_fov_rad=math.radians(90 if is_ahead else 60),
+            pose=self.pose if is_ahead else self.pose @ Pose(0.0, 0.0, math.pi),
             stamp_s=self._now_s,
         )
 

@@ -327,7 +327,7 @@ class FaultyRobot:
             name="faulty robot",
             radius_m=0.22,
             map_name="faulty",
-            has_camera=True,
+            cameras=("front",),
             has_laser=True,
             detector=None,
         )
@@ -338,7 +338,8 @@ class FaultyRobot:
     async def fetch_pose(self) -> StampedPose:
         return StampedPose(self.base.pose, self._now_s)
 
-    async def fetch_picture(self) -> CameraPicture:
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+        del camera
         encoded = io.BytesIO()
         Image.new("RGB", (64, 48), "grey").save(encoded, format="JPEG")
         return CameraPicture(

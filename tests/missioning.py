@@ -52,9 +52,9 @@ class MissionRobot(FakeRobot):
     async def fetch_battery(self) -> float | None:
         return self.battery
 
-    async def fetch_picture(self) -> CameraPicture:
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
         self.n_pictures += 1
-        return await super().fetch_picture()
+        return await super().fetch_picture(camera)
 
 
 class MissionCaller(Caller):

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 
@@ -27,6 +28,7 @@ class RobotDescription:
     Attributes:
         radius_m: Of the smallest circle around it.
         map_name: Which map or building it drives in, as far as the robot can tell.
+        cameras: Their names, first the one that looks ahead: a drive for a picture turns it there.
         has_laser: It has a laser that measures along the floor; whether that turns is not said.
         detector: What its own object detector is called; None where it has none.
         map_frame: What ROS calls the frame of its map.
@@ -36,11 +38,29 @@ class RobotDescription:
     name: str
     radius_m: float
     map_name: str
-    has_camera: bool
+    cameras: tuple[str, ...]
     has_laser: bool
     detector: str | None
     map_frame: str = "map"
     is_radius_assumed: bool = False
+
+    @property
+    def has_camera(self) -> bool:
+        """True where it has a camera."""
+        return bool(self.cameras)
+
+    def find_camera(self, said: str) -> str:
+        """Return the name of a camera, as it is written.
+
+        Raises:
+            LinkError: The robot has no such camera; the hint names those that it has.
+        """
+        wanted = said.strip().casefold()
+        found = next((name for name in self.cameras if name.casefold() == wanted), None)
+        if found is None:
+            known = ", ".join(self.cameras) or "it has none"
+            raise LinkError(f"The robot has no camera {said[:80]!r}.", hint=f"Cameras: {known}.")
+        return found
 
 
 class PoseDoubt(StrEnum):
@@ -52,6 +72,7 @@ class PoseDoubt(StrEnum):
     SILENT_POSE = "silent_pose"
     CLOCK_STANDS = "clock_stands"
     ODOMETRY = "odometry"
+    CAMERA_TURN = "camera_turn"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,14 +106,15 @@ class StampedPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraPicture:
-    """One picture of the front camera.
+    """One picture of a camera.
 
     Attributes:
         media_type: Such as "image/jpeg".
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
-        pose: Where the robot believed it stood, in the map frame.
+        pose: Where the robot believed it stood, in the map frame, with the heading in which the
+            camera looked.
         stamp_s: Robot time of the exposure.
-        pose_doubt: Why it may have stood elsewhere; None for a fresh pose on the map.
+        pose_doubt: Why it may have stood or looked elsewhere; None for a fresh pose on the map.
     """
 
     data: bytes
@@ -278,8 +300,8 @@ class Robot(Protocol):
     async def fetch_pose(self) -> StampedPose:
         """Return where the robot believes it is."""
 
-    async def fetch_picture(self) -> CameraPicture:
-        """Take a picture with the front camera."""
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+        """Take a picture with the camera of that name; None for the one that looks ahead."""
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Return what the robot's own object detector reports in the camera view."""

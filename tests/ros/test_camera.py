@@ -26,7 +26,7 @@ async def test_a_camera_that_is_published_is_waited_for_longer_but_once(
     async with connect_scripted(scripted, patience=PATIENCE) as robot:
         dead = frozenset({TOPIC}) if is_dead else frozenset[str]()
         profile = replace(robot.profile, dead_topics=dead)
-        camera = RosCamera(robot.connection, profile)
+        camera = RosCamera(robot.connection, profile, profile.cameras[0])
         for waited_s in (first_s, 0.1):
             with pytest.raises(LinkError, match=f"within {waited_s:g} s"):
                 await camera.fetch()

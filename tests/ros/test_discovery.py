@@ -65,7 +65,8 @@ def test_a_turtlebot_4_is_understood() -> None:
     assert profile.pose_source is PoseSource.TF
     assert profile.base_frame == "base_footprint"
     assert profile.camera_topic == "/oakd/rgb/preview/image_raw/compressed"
-    assert profile.camera_info_topic == "/oakd/rgb/preview/camera_info"
+    (camera,) = profile.cameras
+    assert (camera.name, camera.info_topic) == ("oakd", "/oakd/rgb/preview/camera_info")
     assert profile.scan_topic == "/scan"
     assert profile.navigation is NavigationKind.NAV2
     assert profile.navigation_name == "/navigate_to_pose"
@@ -230,7 +231,7 @@ def test_every_field_that_a_person_says_is_taken_as_it_stands() -> None:
     assert profile.map_frame == "world"
     assert profile.base_frame == "chassis"
     assert profile.pose_source is PoseSource.ODOMETRY
-    assert profile.camera_type == "sensor_msgs/Image"
+    assert profile.cameras[0].type_name == "sensor_msgs/Image"
     assert profile.scan_topic == "/laser"
     assert profile.navigation_name == "/goal_pose"
     assert profile.velocity_type == "geometry_msgs/TwistStamped"

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mapspeak.ros.discovery.profile import (
+    CameraTopics,
     NavigationKind,
     PoseSource,
     RobotProfile,
@@ -20,7 +21,7 @@ WHOLE = RobotProfile(
     radius_source="costmap",
     map_topic="/map",
     pose_source=PoseSource.TF,
-    camera_topic="/image",
+    cameras=(CameraTopics(name="camera", topic="/image"),),
     scan_topic="/scan",
     navigation=NavigationKind.NAV2,
     navigation_name="/navigate_to_pose",
@@ -79,5 +80,7 @@ def test_a_topic_is_alive_again_once_somebody_publishes_it() -> None:
 
 
 def test_what_tells_more_of_the_same_topic_is_taken_in_late() -> None:
-    told = replace(WHOLE, camera_info_topic="/camera_info")
-    assert later(WHOLE, told).camera_info_topic == "/camera_info"
+    more = replace(WHOLE.cameras[0], info_topic="/camera_info")
+    rear = CameraTopics(name="rear", topic="/rear/image")
+    told = replace(WHOLE, cameras=(more, rear))
+    assert later(WHOLE, told).cameras == (more, rear)

@@ -4,6 +4,7 @@ import base64
 import contextlib
 import io
 import json
+import math
 from typing import Any
 
 import anyio
@@ -129,6 +130,21 @@ async def test_a_camera_gives_pictures_while_somebody_looks(dialect: Dialect) ->
         picture = read_compressed_image(await client.next_on("/camera/image_raw/compressed"))
         info = await client.next_on("/camera/camera_info")
     assert (picture.width_px, picture.height_px) == (info["width"], info["height"]) == (64, 48)
+
+
+@both
+async def test_a_second_camera_has_topics_and_a_frame_of_its_own(dialect: Dialect) -> None:
+    robot = SteppedRobot(two_rooms())
+    robot.cameras = ("front", "rear")
+    async with bridge(dialect, robot) as (robot, connect), connect() as client:
+        await client.send(op="subscribe", topic="/rear_camera/image_raw/compressed")
+        await client.all_before()
+        await robot.let_pass(0.3)
+        await client.next_on("/rear_camera/image_raw/compressed")
+        await client.send(op="subscribe", topic="/tf_static")
+        fixed = read_transforms(await client.next_on("/tf_static"))
+    (rear,) = (each for each in fixed if each.child == "rear_camera_link")
+    assert abs(rear.parent_from_child.yaw_rad) == pytest.approx(math.pi)
 
 
 async def test_a_robot_without_a_camera_or_map_publishes_neither() -> None:

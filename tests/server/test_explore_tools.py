@@ -143,6 +143,18 @@ async def test_looking_around_gives_a_picture_at_each_heading(tmp_path: Path) ->
     assert [round(goal.yaw_deg) for goal in robot.goals.values()] == [120, -120]
 
 
+async def test_looking_around_with_another_camera_turns_the_robot_the_same_way(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.cameras = ("front", "rear")
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        asked = {"n_pictures": 3, "camera": "rear"}
+        result = await client.call_tool("look_around", asked)
+    assert text_of(result).count("camera 'rear'") == 3
+    assert [round(goal.yaw_deg) for goal in robot.goals.values()] == [120, -120]
+
+
 async def test_looking_around_leaves_no_gap_between_pictures(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:

@@ -152,10 +152,10 @@ async def test_many_pages_are_given_the_same_picture_of_the_camera(tmp_path: Pat
     class Slow(FakeRobot):
         n_pictures = 0
 
-        async def fetch_picture(self) -> CameraPicture:
+        async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
             self.n_pictures += 1
             await may_come.wait()
-            return await super().fetch_picture()
+            return await super().fetch_picture(camera)
 
     may_come, robot = anyio.Event(), Slow(two_rooms())
     async with serve_live(tmp_path, robot) as live, anyio.create_task_group() as tasks:
@@ -164,6 +164,18 @@ async def test_many_pages_are_given_the_same_picture_of_the_camera(tmp_path: Pat
         await live.wait_for("alive")
         may_come.set()
     assert robot.n_pictures <= 2
+
+
+async def test_a_person_chooses_among_the_cameras(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.cameras = ("front", "rear")
+    async with serve_live(tmp_path, robot) as live:
+        told = await live.wait_for("robot")
+        for camera, status in (("rear", 200), ("left", 503)):
+            answer = await live.http.get("/robots/robot/camera", params={"camera": camera})
+            assert answer.status_code == status
+        assert (await live.wait_for("robot"))["camera_fov_deg"] is None
+    assert told["cameras"] == ["front", "rear"]
 
 
 async def test_a_mission_is_drawn_with_the_state_of_each_step_and_what_it_asks(
@@ -188,7 +200,7 @@ async def test_the_camera_is_shown_where_there_is_one(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with serve_live(tmp_path, robot) as live:
         assert (await live.http.get("/robots/robot/camera")).status_code == 200
-        robot.has_camera = False
+        robot.cameras = ()
         assert (await live.http.get("/robots/robot/camera")).status_code == 404
 
 

@@ -14,6 +14,8 @@ from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.agents.driver import read_map_picture, read_map_text
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
+from mapspeak.memory.pictures import PictureBook, TakenPicture
 from mapspeak.robot import Detection
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S
@@ -99,6 +101,43 @@ async def test_a_robot_without_a_camera_says_what_to_use_instead(tmp_path: Path)
         result = await client.call_tool("look_through_camera", {})
     assert result.is_error
     assert "look_at_map" in text_of(result)
+
+
+async def test_another_camera_is_named_and_its_picture_is_remembered_with_its_own_heading(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.cameras = ("front", "rear")
+    async with connect(robot, tmp_path) as client:
+        ahead = text_of(await client.call_tool("look_through_camera", {}))
+        behind = text_of(await client.call_tool("look_through_camera", {"camera": "Rear"}))
+        wrong = await client.call_tool("look_through_camera", {"camera": "left"})
+        seen = {"label": "sink", "image_column_px": 32, "range_m": 1, "picture": "P2"}
+        record = {"name": "back", "description": "a sink", "functional_landmarks": [seen]}
+        await client.call_tool("write_semantic_data", record)
+    assert ahead.endswith("Other cameras: rear.")
+    assert "Picture P2, camera 'rear'" in behind
+    assert "yaw 180 deg" in behind
+    assert wrong.is_error
+    assert "front, rear" in text_of(wrong)
+    (waypoint,) = SemanticMapStore(tmp_path / "semantic_map.yaml").read().waypoints
+    assert waypoint.pose.point == robot.pose.point
+    assert abs(waypoint.pose.yaw_deg) == pytest.approx(180)
+
+
+def test_the_robot_is_aimed_by_the_camera_ahead_however_wide_another_one_is() -> None:
+    book = PictureBook()
+    for half_deg, is_ahead in ((40, True), (20, False)):
+        taken = TakenPicture(
+            pose=Pose(0.0, 0.0),
+            stamp_s=float(half_deg),
+            width_px=64,
+            horizontal_fov_rad=math.radians(2 * half_deg),
+            is_ahead=is_ahead,
+        )
+        book.add(taken, b"", media_type="image/jpeg")
+    assert book.half_view_rad == pytest.approx(math.radians(40))
+    assert len(book.views) == 2
 
 
 async def test_what_the_robots_detector_reports_stands_beside_the_picture(tmp_path: Path) -> None:

@@ -191,3 +191,10 @@ def test_a_first_map_shows_as_free_only_what_is_free(warehouse: World) -> None:
     rows, cols = solid.cells_at(grid.points_at(*np.nonzero(grid.free)))
 
     assert (solid.cells[rows, cols] == 0).mean() > 0.995
+
+
+def test_the_rear_camera_sees_what_the_front_one_sees_after_half_a_turn() -> None:
+    ahead = Simulation(load_world("flat_1"), seed=1, start=Pose(2.0, 2.0, math.pi))
+    behind = Simulation(load_world("flat_1"), seed=1, start=Pose(2.0, 2.0, 0.0))
+    differs = ahead.take_picture() != behind.take_picture("rear")
+    assert differs.mean() < 0.01

@@ -27,6 +27,7 @@ from mapspeak.robot import (
 from mapspeak.simulator import (
     BEAM_ANGLES_RAD,
     BODY_RADIUS_M,
+    CAMERAS,
     HORIZONTAL_FOV_RAD,
     MAX_RANGE_M,
     TICK_S,
@@ -81,7 +82,7 @@ class SimulatedRobot:
             name="simulated robot",
             radius_m=BODY_RADIUS_M,
             map_name=self._simulation.world_name,
-            has_camera=True,
+            cameras=tuple(CAMERAS),
             has_laser=True,
             detector="simulated detector" if self._has_detector else None,
         )
@@ -110,11 +111,13 @@ class SimulatedRobot:
         async with self._turn:
             return StampedPose(self._simulation.pose_in_map, self._simulation.time_s)
 
-    async def fetch_picture(self) -> CameraPicture:
-        """Render the view of the front camera."""
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+        """Render the view of a camera."""
+        ahead, *_ = self.description.cameras
+        name = ahead if camera is None else self.description.find_camera(camera)
         # Drawing takes long and needs only the pose: a stop must not wait for it.
         async with self._looking:
-            return await anyio.to_thread.run_sync(self._take_picture)
+            return await anyio.to_thread.run_sync(self._take_picture, name)
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Return the simulated detector's reports; none when it is switched off."""
@@ -180,8 +183,8 @@ class SimulatedRobot:
             self._simulation.step()
             self._after_step()
 
-    def _take_picture(self) -> CameraPicture:
-        rgb = self._simulation.take_picture()
+    def _take_picture(self, camera: str) -> CameraPicture:
+        rgb = self._simulation.take_picture(camera)
         encoded = io.BytesIO()
         Image.fromarray(rgb).save(encoded, format="JPEG", quality=JPEG_QUALITY)
         height_px, width_px = rgb.shape[:2]
@@ -191,7 +194,7 @@ class SimulatedRobot:
             width_px=width_px,
             height_px=height_px,
             horizontal_fov_rad=HORIZONTAL_FOV_RAD,
-            pose=self._simulation.pose_in_map,
+            pose=self._simulation.pose_in_map @ CAMERAS[camera],
             stamp_s=self._simulation.time_s,
         )
 

@@ -9,7 +9,7 @@ from datetime import datetime
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import LaserRing
-from mapspeak.spatial.viewing import HALF_VIEW_RAD, CameraView
+from mapspeak.spatial.viewing import HALF_VIEW_RAD, CameraView, find_half_view_rad
 
 MOST_PICTURES = 500
 """Number of pictures that can be referred to; older ones are forgotten here, kept or not."""
@@ -38,7 +38,8 @@ class TakenPicture:
     Attributes:
         id: Short id for readers: P12.
         name: Relative file name, unique among all runs: P12-5d0c21f7.jpg.
-        pose: Of the robot in the map frame; the camera looks along its heading.
+        pose: In the map frame: of the robot, with the heading in which the camera looked.
+        is_ahead: Taken by the camera that a robot turns to what it is to look at.
         reported: Labels of everything the robot's detector reports in it; None without a detector.
     """
 
@@ -52,6 +53,7 @@ class TakenPicture:
     readings: tuple[PictureReading, ...] = ()
     laser: LaserRing | None = None
     reported: tuple[str, ...] | None = None
+    is_ahead: bool = True
 
     def shows(self, bearing_rad: float) -> bool:
         """Return True if a direction, from the heading, is in the picture or just beside it."""
@@ -62,9 +64,9 @@ class TakenPicture:
     @property
     def view(self) -> CameraView:
         """Its pose and its known or assumed field of view."""
-        if self.horizontal_fov_rad is None:
-            return CameraView(self.pose)
-        return CameraView(self.pose, self.horizontal_fov_rad / 2)
+        fov_rad = self.horizontal_fov_rad
+        half_rad = HALF_VIEW_RAD if fov_rad is None else fov_rad / 2
+        return CameraView(self.pose, half_rad, self.is_ahead)
 
     def bearing_of(self, column_px: float) -> float:
         """Return the direction of a column from the heading, left positive, in radians.
@@ -113,8 +115,8 @@ class PictureBook:
 
     @property
     def half_view_rad(self) -> float:
-        """Half the field of view of the latest picture, or of a common camera."""
-        return self._views[-1].half_view_rad if self._views else HALF_VIEW_RAD
+        """Half the field of view of the camera that looks ahead, or of a common camera."""
+        return find_half_view_rad(self._views)
 
     @property
     def views(self) -> tuple[CameraView, ...]:

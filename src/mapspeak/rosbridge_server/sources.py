@@ -3,13 +3,14 @@
 import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
-from mapspeak.geometry import Pose
-from mapspeak.robot import RangeScan, Robot, StampedPose
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.robot import RangeScan, Robot, RobotDescription, StampedPose
 from mapspeak.ros.messages.fields import Dialect, write_header, write_stamp
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import (
@@ -34,10 +35,45 @@ ESTIMATE_PERIOD_S = 0.5
 PICTURE_PERIOD_S = 0.2
 SCAN_PERIOD_S = 0.1
 BATTERY_PERIOD_S = 1.0
-CAMERA_FRAME, LASER_FRAME = "camera_link", "base_scan"
-IMAGE_TOPIC, INFO_TOPIC = "/camera/image_raw/compressed", "/camera/camera_info"
+LASER_FRAME = "base_scan"
 SCAN_TOPIC = "/scan"
 N_BEAMS = 720
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraFace:
+    """A camera as ROS has it: its node's name, its topics and its frame.
+
+    Attributes:
+        camera: Its name at the port; None for the one that looks ahead.
+    """
+
+    camera: str | None
+    node: str
+
+    @property
+    def image_topic(self) -> str:
+        """The topic of its pictures."""
+        return f"/{self.node}/image_raw/compressed"
+
+    @property
+    def info_topic(self) -> str:
+        """The topic of its measures."""
+        return f"/{self.node}/camera_info"
+
+    @property
+    def frame(self) -> str:
+        """Its frame."""
+        return f"{self.node}_link"
+
+
+def face_cameras(description: RobotDescription) -> tuple[CameraFace, ...]:
+    """Return a robot's cameras; the one that looks ahead is /camera, as on common robots."""
+    ahead, others = description.cameras[:1], description.cameras[1:]
+    return (
+        *(CameraFace(camera=None, node="camera") for _ in ahead),
+        *(CameraFace(camera=name, node=f"{name}_camera") for name in others),
+    )
 
 
 @dataclass(slots=True)
@@ -64,10 +100,12 @@ class Sources:
         self._last: StampedPose | None = None
         self._estimate_topic = "/amcl_pose" if dialect is Dialect.ROS1 else "/pose"
         self._estimate_due_s = 0.0
-        self._has_looked = False
+        self._looked: set[str] = set()
+        self._fixed: list[FrameTransform] = []
         self._slow = [Source(self._publish_map, MAP_PERIOD_S)]
-        if robot.description.has_camera:
-            self._slow.append(Source(self._publish_picture, PICTURE_PERIOD_S))
+        self._cameras = face_cameras(robot.description)
+        for camera in self._cameras:
+            self._slow.append(Source(partial(self._publish_picture, camera), PICTURE_PERIOD_S))
         if robot.description.has_laser:
             self._slow.append(Source(self._publish_scan, SCAN_PERIOD_S))
         if skilled is not None:
@@ -75,14 +113,13 @@ class Sources:
 
     async def start(self) -> None:
         """Publish the latched topics, so that the first client finds them."""
-        fixed = [("base_link", BASE_FRAME), (CAMERA_FRAME, "base_link")]
+        self._fix("base_link", BASE_FRAME)
+        for camera in self._cameras:
+            if camera.camera is None:
+                self._fix(camera.frame, "base_link")
         if self._robot.description.has_laser:
-            fixed.append((LASER_FRAME, "base_link"))
-        transforms = [
-            FrameTransform(parent_from_child=Pose(0.0, 0.0), parent=parent, child=child, stamp_s=0)
-            for child, parent in fixed
-        ]
-        self._hub.publish("/tf_static", write_transforms(transforms, dialect=self._dialect))
+            self._fix(LASER_FRAME, "base_link")
+        self._hub.publish("/tf_static", write_transforms(self._fixed, dialect=self._dialect))
         await self._attempt(self._publish_map)
 
     async def publish_due(self, tasks: TaskGroup) -> None:
@@ -125,16 +162,24 @@ class Sources:
             message = write_battery(ratio, now_s, dialect=self._dialect)
             self._hub.publish(BATTERY_TOPIC, message)
 
-    async def _publish_picture(self) -> None:
-        is_wanted = self._hub.is_wanted(IMAGE_TOPIC) or self._hub.is_wanted(INFO_TOPIC)
+    def _fix(self, child: str, parent: str, turn_rad: float = 0.0) -> None:
+        mounting = Pose(0.0, 0.0, turn_rad)
+        self._fixed.append(
+            FrameTransform(parent_from_child=mounting, parent=parent, child=child, stamp_s=0)
+        )
+
+    async def _publish_picture(self, face: CameraFace) -> None:
+        is_wanted = self._hub.is_wanted(face.image_topic) or self._hub.is_wanted(face.info_topic)
         # The first picture takes long, which no client should have to wait for.
-        if self._has_looked and not is_wanted:
+        if face.node in self._looked and not is_wanted:
             return
-        self._has_looked = True
-        taken = await self._robot.fetch_picture()
-        header = write_header(CAMERA_FRAME, taken.stamp_s, dialect=self._dialect)
+        here = await self._robot.fetch_pose()
+        taken = await self._robot.fetch_picture(face.camera)
+        if face.camera is None or here.pose == (await self._robot.fetch_pose()).pose:
+            self._note_look(face, wrap_angle(taken.pose.yaw_rad - here.pose.yaw_rad))
+        header = write_header(face.frame, taken.stamp_s, dialect=self._dialect)
         form = taken.media_type.removeprefix("image/")
-        self._hub.publish(IMAGE_TOPIC, {"header": header, "format": form, "data": taken.data})
+        self._hub.publish(face.image_topic, {"header": header, "format": form, "data": taken.data})
         info = write_camera_info(
             header,
             width_px=taken.width_px,
@@ -142,7 +187,14 @@ class Sources:
             horizontal_fov_rad=taken.horizontal_fov_rad,
             dialect=self._dialect,
         )
-        self._hub.publish(INFO_TOPIC, info)
+        self._hub.publish(face.info_topic, info)
+
+    def _note_look(self, face: CameraFace, turn_rad: float) -> None:
+        """Tell to which side a camera looks by its first picture: the port tells no frames."""
+        if face.camera is not None and face.node not in self._looked:
+            self._fix(face.frame, "base_link", turn_rad)
+            self._hub.publish("/tf_static", write_transforms(self._fixed, dialect=self._dialect))
+        self._looked.add(face.node)
 
     async def _publish_scan(self) -> None:
         if not self._hub.is_wanted(SCAN_TOPIC):

@@ -28,18 +28,17 @@ from mapspeak.rosbridge_server.skillservices import (
     types_of,
 )
 from mapspeak.rosbridge_server.sources import (
-    IMAGE_TOPIC,
-    INFO_TOPIC,
     SCAN_TOPIC,
     TICK_S,
     Sources,
+    face_cameras,
 )
 from mapspeak.skill import SkilledRobot
 
 STATUS_PERIOD_S = 0.2
 FEEDBACK_PERIOD_S = 0.1
 BASE_NODE = "/robot_base"
-CAMERA_NODE, LASER_NODE = "/camera", "/laser"
+LASER_NODE = "/laser"
 STATE_NODE = "/robot_state_publisher"
 SLAM_NODES = {Dialect.ROS1: "/slam_gmapping", Dialect.ROS2: "/slam_toolbox"}
 NAVIGATORS = {Dialect.ROS1: "/move_base", Dialect.ROS2: "/bt_navigator"}
@@ -58,10 +57,11 @@ def topics_of(dialect: Dialect, offered: RobotDescription) -> list[Topic]:
         _published("/odom", "nav_msgs/Odometry", BASE_NODE),
         _heard("/cmd_vel", "geometry_msgs/Twist", BASE_NODE),
     ]
-    if offered.has_camera:
+    for camera in face_cameras(offered):
+        node = f"/{camera.node}"
         topics += [
-            _published(IMAGE_TOPIC, "sensor_msgs/CompressedImage", CAMERA_NODE, depth=1),
-            _published(INFO_TOPIC, "sensor_msgs/CameraInfo", CAMERA_NODE, depth=1),
+            _published(camera.image_topic, "sensor_msgs/CompressedImage", node, depth=1),
+            _published(camera.info_topic, "sensor_msgs/CameraInfo", node, depth=1),
         ]
     if offered.has_laser:
         topics.append(_published(SCAN_TOPIC, "sensor_msgs/LaserScan", LASER_NODE, depth=1))

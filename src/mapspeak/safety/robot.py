@@ -104,9 +104,9 @@ class GuardedRobot:
         """Return where the robot believes it is."""
         return await self._robot.fetch_pose()
 
-    async def fetch_picture(self) -> CameraPicture:
-        """Take a picture with the front camera."""
-        return await self._robot.fetch_picture()
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+        """Take a picture."""
+        return await self._robot.fetch_picture(camera)
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         """Return how goals stand that others have sent."""

@@ -1,6 +1,6 @@
 """A world with one robot, stepped by hand: no clock, no network, no port."""
 
-from mapspeak.simulator.camera.camera import HORIZONTAL_FOV_RAD, measure_shares_in_view
+from mapspeak.simulator.camera.camera import CAMERAS, HORIZONTAL_FOV_RAD, measure_shares_in_view
 from mapspeak.simulator.robot.controller import KEEP_OFF_M
 from mapspeak.simulator.robot.equipment import Equipment
 from mapspeak.simulator.robot.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
@@ -32,6 +32,7 @@ from mapspeak.simulator.worlds.worldfiles import load_world, world_names
 __all__ = [
     "BEAM_ANGLES_RAD",
     "BODY_RADIUS_M",
+    "CAMERAS",
     "HORIZONTAL_FOV_RAD",
     "KEEP_OFF_M",
     "MAX_RANGE_M",

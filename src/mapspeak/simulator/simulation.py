@@ -16,10 +16,7 @@ from numpy.typing import NDArray
 from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection, GoalState, GoalStatus
-from mapspeak.simulator.camera.camera import (
-    PinholeCamera,
-    SimulatedDetector,
-)
+from mapspeak.simulator.camera.camera import CAMERAS, FRONT, PinholeCamera, SimulatedDetector
 from mapspeak.simulator.robot.controller import Obstacles
 from mapspeak.simulator.robot.equipment import Equipment
 from mapspeak.simulator.robot.lidar import Lidar, LidarScan
@@ -134,9 +131,9 @@ class Simulation:
         """Return the SLAM map; the same one until it has changed."""
         return self._mapper.publish(stamp_s=self.time_s)
 
-    def take_picture(self) -> NDArray[np.uint8]:
-        """Take a picture with the front camera: 0 to 255, shape (height, width, 3)."""
-        return self._camera.render(self._body.world_from_base)
+    def take_picture(self, camera: str = FRONT) -> NDArray[np.uint8]:
+        """Take a picture with one of `CAMERAS`: 0 to 255, shape (height, width, 3)."""
+        return self._camera.render(self._body.world_from_base @ CAMERAS[camera])
 
     def detect(self) -> tuple[Detection, ...]:
         """Return what the simulated detector reports of the camera's view, from left to right."""

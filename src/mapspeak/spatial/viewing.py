@@ -1,7 +1,7 @@
 """What a camera shows from a place: the floor and the walls in each heading, and what is new."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -34,10 +34,22 @@ class CameraView:
 
     Attributes:
         pose: In the map frame; the camera looks along its heading.
+        is_ahead: It is the camera that a robot turns to what it is to look at.
     """
 
     pose: Pose
     half_view_rad: float = HALF_VIEW_RAD
+    is_ahead: bool = True
+
+
+def find_half_view_rad(views: Sequence[CameraView]) -> float:
+    """Return half the opening of the camera that looks ahead, or of a common one.
+
+    Args:
+        views: The pictures so far, the latest last.
+    """
+    ahead = (view.half_view_rad for view in reversed(views) if view.is_ahead)
+    return next(ahead, HALF_VIEW_RAD)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -43,6 +43,17 @@ async def test_a_mission_runs_by_itself_and_tells_what_was_done(tmp_path: Path) 
     assert done == ["2 drive", "3 look:", "4 drive", "5 note:"]
 
 
+async def test_a_mission_looks_through_a_camera_by_its_name_where_the_robot_stands(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        caller.robot.cameras = ("front", "rear")
+        told = await caller.ask("run_mission", tree="- look: {camera: rear}\n")
+        assert "succeeded" in told
+        told = await caller.ask("run_mission", tree="- look: {place: R2, camera: rear}\n")
+    assert "Only the front camera is turned to a place" in told
+
+
 async def test_a_tree_may_be_json_as_a_text_or_as_it_is(tmp_path: Path) -> None:
     tree = {"sequence": [{"drive": "R2"}, {"wait": 1}]}
     async with missions(tmp_path) as caller:

@@ -107,7 +107,7 @@ class StuckLaser(FakeRobot):
             name=bare.name,
             radius_m=bare.radius_m,
             map_name=bare.map_name,
-            has_camera=True,
+            cameras=("front",),
             has_laser=True,
             detector=None,
         )

@@ -11,8 +11,8 @@ from mapspeak.places.standing import spread_places
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.viewing import (
-    HALF_VIEW_RAD,
     CameraView,
+    find_half_view_rad,
     heading_rad,
     mask_pictured,
     measure_pictured,
@@ -61,7 +61,7 @@ def find_camera_target(
         is_closed: Whether a drive to a place has just failed.
     """
     shown = mask_pictured(world.grid, views)
-    half_rad = views[-1].half_view_rad if views else HALF_VIEW_RAD
+    half_rad = find_half_view_rad(views)
     here = world.robot.point
     around_m = new_wall_by_heading(world.grid, shown, np.array([[here.x, here.y]]))[0]
     if sum_by_heading(around_m, half_rad).max() >= TURN_WORTH_M and not is_closed(here):

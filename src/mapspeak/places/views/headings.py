@@ -12,10 +12,10 @@ from mapspeak.places.standing import COMFORT_M
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.viewing import (
-    HALF_VIEW_RAD,
     N_RAYS,
     SIGHT_M,
     CameraView,
+    find_half_view_rad,
     heading_of,
     look_all_around,
     mask_pictured,
@@ -43,7 +43,7 @@ def aim_for_picture(
     Args:
         views: The pictures so far, the latest last.
     """
-    half_rad = views[-1].half_view_rad if views else HALF_VIEW_RAD
+    half_rad = find_half_view_rad(views)
     within_rad = half_rad if isinstance(goal.place.thing, Frontier) else math.pi
     pose = face_new_walls(world, goal.pose, views, within_rad=within_rad)
     return replace(goal, pose=pose, check=replace(goal.check, goal=pose))
@@ -58,7 +58,7 @@ def face_new_walls(
         views: The pictures so far, the latest last.
         within_rad: The farthest it is turned.
     """
-    half_rad = views[-1].half_view_rad if views else HALF_VIEW_RAD
+    half_rad = find_half_view_rad(views)
     new_m = _new_wall_m(world, pose, views, half_rad)
     turns_rad = np.array([abs(wrap_angle(heading_of(ray) - pose.yaw_rad)) for ray in range(N_RAYS)])
     new_m = np.where(turns_rad <= within_rad, new_m, 0.0)

@@ -15,6 +15,7 @@ FrameName = Annotated[str, Field(pattern=r"^/?[\w/.-]+$")]
 Words = Annotated[str, Field(pattern=r"\S", max_length=200)]
 
 
+CameraName = Annotated[str, Field(pattern=r"^[\w/.-]+$", max_length=60)]
 PlainWord = Annotated[str, Field(pattern=r"^[\w.:%-]+$", max_length=200)]
 
 
@@ -63,6 +64,8 @@ class RobotOverrides(BaseModel):
         pose_topic: "tf", or a topic that tells the pose.
         pose_type: The type of that topic, where the robot does not list it.
         camera_topic: Of sensor_msgs/Image or sensor_msgs/CompressedImage.
+        cameras: Such topics by the names that the cameras have; without `camera_topic` the first
+            looks ahead.
         camera_type: The type of that topic, where the robot does not list it.
         navigation_name: The action, or the topic for goals.
         velocity_topic: Of geometry_msgs/Twist or TwistStamped.
@@ -85,6 +88,9 @@ class RobotOverrides(BaseModel):
     camera_topic: TopicName | None = None
     camera_type: TypeName | None = None
     camera_info_topic: TopicName | None = None
+    cameras: Annotated[dict[CameraName, TopicName], Field(max_length=12)] = Field(
+        default_factory=dict
+    )
     scan_topic: TopicName | None = None
     navigation: Literal["nav2", "move_base", "goal_topic", "none"] | None = None
     navigation_name: TopicName | None = None

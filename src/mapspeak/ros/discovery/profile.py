@@ -37,6 +37,22 @@ class NavigationKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CameraTopics:
+    """A camera.
+
+    Attributes:
+        topic: Of its pictures.
+        type_name: Image or CompressedImage, as "package/Type".
+        info_topic: Of its measures; None where it does not tell them.
+    """
+
+    name: str
+    topic: str
+    type_name: str = RAW_IMAGE
+    info_topic: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotProfile:
     """The interfaces of a robot; None where it has none.
 
@@ -45,7 +61,7 @@ class RobotProfile:
         pose_topic: The topic, where it is not TF.
         pose_type: Its type, as "package/Type".
         tf_topics: /tf and /tf_static, or those of a namespace.
-        camera_type: Image or CompressedImage, as "package/Type".
+        cameras: The one that looks ahead first.
         navigation_name: The action, or the topic for goals.
         planner_name: The action or service that plans a path without driving it.
         velocity_type: Twist or TwistStamped, as "package/Type".
@@ -70,9 +86,7 @@ class RobotProfile:
     pose_topic: str | None = None
     pose_type: str | None = None
     tf_topics: tuple[str, str] = ("/tf", "/tf_static")
-    camera_topic: str | None = None
-    camera_type: str | None = None
-    camera_info_topic: str | None = None
+    cameras: tuple[CameraTopics, ...] = ()
     scan_topic: str | None = None
     navigation: NavigationKind = NavigationKind.NONE
     navigation_name: str | None = None
@@ -83,6 +97,11 @@ class RobotProfile:
     namespace: str = ""
     other_namespaces: tuple[str, ...] = ()
     dead_topics: frozenset[str] = frozenset()
+
+    @property
+    def camera_topic(self) -> str | None:
+        """The topic of the camera that looks ahead."""
+        return self.cameras[0].topic if self.cameras else None
 
 
 def end_of_goals(kind: NavigationKind, name: str | None) -> str | None:
@@ -153,7 +172,7 @@ FIELDS = {
         *("pose_source", "pose_topic", "pose_type", "map_frame", "base_frame", "tf_topics"),
         *("namespace", "other_namespaces", "name"),
     ),
-    RobotPart.CAMERA: ("camera_topic", "camera_type", "camera_info_topic"),
+    RobotPart.CAMERA: ("cameras",),
     RobotPart.LASER: ("scan_topic",),
     RobotPart.NAVIGATION: ("navigation", "navigation_name", "planner_name"),
     RobotPart.VELOCITY: ("velocity_topic", "velocity_type"),

@@ -18,6 +18,7 @@ from mapspeak.ros.discovery.profile import (
     TWIST,
     TWIST_STAMPED,
     USUAL_RADIUS_M,
+    CameraTopics,
     NavigationKind,
     PoseSource,
     RobotProfile,
@@ -53,6 +54,10 @@ class Nearness:
         """Return the first of the names that lies in the namespace, else the first."""
         listed = list(names)
         return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
+
+    def has(self, name: str) -> bool:
+        """Return True for a served topic of the robot; without a namespace, of any."""
+        return name not in self.dead and (not self.namespace or self._is_near(name))
 
     def _is_near(self, name: str) -> bool:
         prefix = self.namespace.strip("/")
@@ -109,6 +114,11 @@ CAMERAS = Wanted(
     never=("depth", "disparity", "mask", "debug", "infra", "/ir/", "label", "segment", "costmap"),
     takes_others=True,
 )  # fmt: skip
+PICTURE_PARTS = frozenset(part for end in CAMERAS.endings for part in end.split("/")) | {
+    "image_rect", "preview",
+}  # fmt: skip
+"""Parts of a topic's name that say of what kind a picture is, and not whose."""
+MOST_CAMERAS = 12
 GOALS = Wanted(
     types=(POSE_STAMPED,),
     endings=("/goal_pose", "/move_base_simple/goal", "/goal"),
@@ -157,7 +167,8 @@ def choose_profile(
         dead_topics=dead | _find_dead_action(graph, navigation),
         **choice.map(),
         **choice.pose(),
-        **choice.camera(),
+        # Of several robots, the cameras of the others are not this one's.
+        cameras=choice.cameras()[: 1 if others else MOST_CAMERAS],
         **choice.velocity(),
         **navigation,
     )
@@ -208,7 +219,10 @@ class _Choice:
         self._near = near
 
     def best(self, wanted: Wanted) -> str | None:
-        ranked = sorted(
+        return self._near.first(self._rank(wanted))
+
+    def _rank(self, wanted: Wanted) -> list[str]:
+        return sorted(
             (topic for topic in self._graph.topics_of(*wanted.types) if _may_be(topic, wanted)),
             key=lambda topic: (
                 topic in self._near.dead,
@@ -218,7 +232,6 @@ class _Choice:
                 topic,
             ),
         )
-        return self._near.first(ranked)
 
     def listed(self, topic: str) -> str | None:
         return topic if topic in self._graph.types else None
@@ -256,17 +269,32 @@ class _Choice:
                 return source, topic, self._graph.types[topic]
         return PoseSource.NONE, None, None
 
-    def camera(self) -> Fields:
-        topic = self._said.camera_topic or self.best(CAMERAS)
-        if topic is None:
-            return {}
+    def cameras(self) -> tuple[CameraTopics, ...]:
+        """Return the camera that looks ahead, and others: those that robot.yaml names, if any."""
+        said = self._said
+        others = list(said.cameras.values()) or [
+            topic
+            for topic in self._rank(CAMERAS)
+            if self._near.has(topic) and _place_of(topic, CAMERAS) < len(CAMERAS.endings)
+        ]
+        ahead = said.camera_topic or next(iter(said.cameras.values()), self.best(CAMERAS))
+        names = {topic: name for name, topic in said.cameras.items()}
+        by_name: dict[str, str] = {}
+        for topic in filter(None, (ahead, *others)):
+            name = names.get(topic) or name_camera(topic, namespace=self._near.namespace)
+            by_name.setdefault(name, topic)
+        return tuple(self._camera(name, topic) for name, topic in by_name.items())
+
+    def _camera(self, name: str, topic: str) -> CameraTopics:
+        said, is_said = self._said, topic == self._said.camera_topic
         guess = COMPRESSED_IMAGE if topic.endswith("/compressed") else RAW_IMAGE
         beside = f"{topic.removesuffix('/compressed').rpartition('/')[0]}/camera_info"
-        return {
-            "camera_topic": topic,
-            "camera_type": self._type(topic, self._said.camera_type, guess),
-            "camera_info_topic": self._said.camera_info_topic or self.listed(beside),
-        }
+        return CameraTopics(
+            name=name,
+            topic=topic,
+            type_name=self._type(topic, said.camera_type if is_said else None, guess),
+            info_topic=(said.camera_info_topic if is_said else None) or self.listed(beside),
+        )
 
     def velocity(self) -> Fields:
         topic = self._said.velocity_topic or self.best(VELOCITIES)
@@ -328,6 +356,16 @@ class _Choice:
             if prefixed:
                 return str(self._near.first(prefixed)).lstrip("/")
         return names[-1]
+
+
+def name_camera(topic: str, *, namespace: str) -> str:
+    """Return a camera's name: its topic's without what says of which kind the picture is."""
+    own = topic.removeprefix(f"{namespace}/") if namespace else topic
+    parts: list[str] = []
+    for part in filter(None, own.split("/")):
+        if part.lower() not in PICTURE_PARTS and part not in parts[-1:]:
+            parts.append(part)
+    return "/".join(parts) or "camera"
 
 
 def _may_be(topic: str, wanted: Wanted) -> bool:

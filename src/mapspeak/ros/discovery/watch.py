@@ -168,6 +168,8 @@ async def _choose_alive(
             topic = part.topic(profile)
             if topic is not None and part is not RobotPart.RADIUS and topic not in graph.actions:
                 await liveness.ask(topic, is_heard=part.is_heard(profile))
+        for camera in profile.cameras[1:] if graph.types else ():
+            await liveness.ask(camera.topic, is_heard=False)
         if liveness.dead == before:
             break
     profile = choose_profile(graph, overrides, frames=frames, dead=liveness.dead, services=services)

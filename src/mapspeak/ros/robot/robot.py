@@ -6,12 +6,13 @@ from dataclasses import replace
 from functools import partial
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import (
     CameraPicture,
     Detection,
     GoalState,
     GoalStatus,
+    PoseDoubt,
     RangeScan,
     RobotDescription,
     StampedPose,
@@ -29,7 +30,7 @@ from mapspeak.ros.robot.driving import (
 )
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
-from mapspeak.ros.robot.sensors import Laser, RosCamera
+from mapspeak.ros.robot.sensors import Laser, RosCamera, find_camera_yaw_rad, no_camera
 from mapspeak.ros.robot.stopping import Brake, stop_everything
 from mapspeak.ros.transforms import FrameListener
 from mapspeak.spatial import OccupancyGrid
@@ -57,7 +58,7 @@ class RosRobot:
         self._n_sending = 0
         profile = watch.profile
         self._maps = MapSubscriber(connection, profile)
-        self._camera = RosCamera(connection, profile)
+        self._cameras: dict[str, RosCamera] = {}
         self._laser = Laser(connection, profile, frames=frames, clock=clock)
         self._poses = PoseKeeper(connection, profile, frames)
         self._brake = self._build_brake()
@@ -77,7 +78,7 @@ class RosRobot:
             name=self.profile.name,
             radius_m=self.profile.radius_m,
             map_name=self.profile.map_name,
-            has_camera=RobotPart.CAMERA.is_alive(self.profile),
+            cameras=self._name_cameras(),
             has_laser=RobotPart.LASER.is_alive(self.profile),
             detector=None,
             map_frame=self.profile.map_frame,
@@ -115,21 +116,31 @@ class RosRobot:
         await self._watch.wait_for(RobotPart.POSE)
         return await self._find_pose()
 
-    async def fetch_picture(self) -> CameraPicture:
-        """Take a picture with the front camera."""
+    async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+        """Take a picture with a camera, of which the frames say to which side it looks."""
         await self.connection.wait_until_connected()
-        await self._watch.find(RobotPart.CAMERA)
-        picture = await self._camera.fetch()
+        eye = await self._find_camera(camera)
+        picture = await eye.fetch()
         here = await self._find_pose()
+        doubt = here.find_doubt(self.now_s)
+        try:
+            yaw_rad = find_camera_yaw_rad(
+                self._frames.tree, base=self.profile.base_frame, camera=picture.frame_id
+            )
+        except LinkError:
+            # Robots whose frames do not say have their main camera in front.
+            yaw_rad, ahead = 0.0, self.profile.cameras[0].name
+            is_ahead = eye is self._cameras.get(ahead)
+            doubt = doubt if is_ahead else PoseDoubt.CAMERA_TURN
         return CameraPicture(
             data=picture.data,
             media_type=picture.media_type,
             width_px=picture.width_px,
             height_px=picture.height_px,
-            horizontal_fov_rad=await self._camera.fetch_fov_rad(),
-            pose=here.pose,
+            horizontal_fov_rad=await eye.fetch_fov_rad(),
+            pose=Pose(here.pose.x, here.pose.y, wrap_angle(here.pose.yaw_rad + yaw_rad)),
             stamp_s=picture.stamp_s,
-            pose_doubt=here.find_doubt(self.now_s),
+            pose_doubt=doubt,
         )
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
@@ -198,6 +209,26 @@ class RosRobot:
         """Return when all that the robot offers counts as found."""
         await self._watch.settle()
 
+    def _name_cameras(self) -> tuple[str, ...]:
+        is_alive = RobotPart.CAMERA.is_alive(self.profile)
+        return tuple(camera.name for camera in self.profile.cameras) if is_alive else ()
+
+    async def _find_camera(self, said: str | None) -> RosCamera:
+        """Return a camera by its name, or the one that looks ahead."""
+        await self._watch.find(RobotPart.CAMERA)
+        topics = next(iter(self.profile.cameras), None)
+        if said is not None:
+            if said not in self._name_cameras():
+                # It may have been started since.
+                await self._watch.look()
+            name = self.description.find_camera(said)
+            topics = next(each for each in self.profile.cameras if each.name == name)
+        if topics is None:
+            raise no_camera()
+        if topics.name not in self._cameras:
+            self._cameras[topics.name] = RosCamera(self.connection, self.profile, topics)
+        return self._cameras[topics.name]
+
     async def _find_pose(self) -> StampedPose:
         return replace(await self._poses.fetch(), is_clock_still=self._clock.is_still)
 
@@ -216,7 +247,7 @@ class RosRobot:
             self._maps.close()
             self._maps = MapSubscriber(self.connection, now)
         if is_new(RobotPart.CAMERA):
-            self._camera = RosCamera(self.connection, now)
+            self._cameras = {}
         if is_new(RobotPart.LASER) or is_new(RobotPart.POSE):
             self._laser = Laser(self.connection, now, frames=self._frames, clock=self._clock)
         if is_new(RobotPart.POSE):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mapspeak.errors import LinkError
 from mapspeak.robot import RangeScan
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE, RobotPart, RobotProfile
+from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, CameraTopics, RobotProfile
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
 from mapspeak.ros.messages.scans import LaserScan, read_fov_rad, read_scan
@@ -79,14 +79,22 @@ INFO_PATIENCE_S = 1.0
 CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
 
 
+def no_camera() -> LinkError:
+    """Return the error for a robot without a camera."""
+    return LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
+
+
 class RosCamera:
     """Takes pictures."""
 
-    def __init__(self, connection: RosConnection, profile: RobotProfile) -> None:
+    def __init__(
+        self, connection: RosConnection, profile: RobotProfile, camera: CameraTopics
+    ) -> None:
         self._connection = connection
         self._profile = profile
+        self._topics = camera
         self._patience_s = connection.patience.picture_s
-        is_alive = RobotPart.CAMERA.is_alive(profile)
+        is_alive = camera.topic not in profile.dead_topics
         first_s = connection.patience.first_picture_s
         self._next_patience_s = first_s if is_alive else self._patience_s
         self._slowest_s = 0.0
@@ -96,11 +104,11 @@ class RosCamera:
         """Return a picture that arrives after it was asked for.
 
         Raises:
-            LinkError: There is no camera, no picture came, or it cannot be read.
+            LinkError: No picture came, or it cannot be read.
         """
         with self._idle.look() as (pictures, *_):
             message = await self._next_message(pictures)
-        is_compressed = self._profile.camera_type == COMPRESSED_IMAGE
+        is_compressed = self._topics.type_name == COMPRESSED_IMAGE
         return read_compressed_image(message) if is_compressed else read_image(message)
 
     async def fetch_fov_rad(self) -> float | None:
@@ -116,16 +124,15 @@ class RosCamera:
 
     def _subscribe(self) -> tuple[Subscription, ...]:
         """Begin with the pictures; the camera's measures follow where it tells them."""
-        profile = self._profile
-        if profile.camera_topic is None:
-            raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
-        type_name = profile.dialect.type_name(profile.camera_type or RAW_IMAGE)
+        topics = self._topics
         pictures = self._connection.subscribe(
-            profile.camera_topic, type_name=type_name, throttle_ms=THROTTLE_MS
+            topics.topic,
+            type_name=self._profile.dialect.type_name(topics.type_name),
+            throttle_ms=THROTTLE_MS,
         )
-        if profile.camera_info_topic is None:
+        if topics.info_topic is None:
             return (pictures,)
-        infos = self._connection.subscribe(profile.camera_info_topic, throttle_ms=THROTTLE_MS)
+        infos = self._connection.subscribe(topics.info_topic, throttle_ms=THROTTLE_MS)
         return pictures, infos
 
     async def _next_message(self, pictures: Subscription) -> Message:
@@ -139,6 +146,27 @@ class RosCamera:
         enough_s = max(self._patience_s, TIMES_SLOWEST * self._slowest_s)
         self._next_patience_s = min(enough_s, LONGEST_PATIENCE_S)
         return message
+
+
+LEAST_LEVEL_RATIO = 0.3
+"""A camera whose axis is steeper looks at the floor or the ceiling, and to no side."""
+
+
+def find_camera_yaw_rad(tree: TransformTree, *, base: str, camera: str) -> float:
+    """Return to which side of the robot a camera looks, left positive.
+
+    Pictures are in an optical frame, whose z axis points ahead (REP 103); many drivers name the
+    camera's body instead, whose x axis does, and whose z axis points up.
+
+    Raises:
+        LinkError: The frames do not say.
+    """
+    base_from_camera = tree.find_matrix(base, camera)
+    for axis in (2, 0):
+        x, y, _ = base_from_camera[:3, axis]
+        if math.hypot(x, y) >= LEAST_LEVEL_RATIO:
+            return math.atan2(y, x)
+    raise LinkError("The camera looks up or down.", hint="Its picture shows no side of the robot.")
 
 
 MOST_TILT_RAD = math.radians(10.0)

@@ -43,6 +43,8 @@ POSE_DOUBTS = {
     PoseDoubt.CLOCK_STANDS: "the robot's clock stands; check that a simulation is not paused",
     PoseDoubt.ODOMETRY: "it is odometry, which drifts away from the map; start SLAM or "
     "localisation",
+    PoseDoubt.CAMERA_TURN: "the robot's frames do not say to which side this camera looks; the "
+    "heading is the robot's own",
 }
 
 COMPASS = (

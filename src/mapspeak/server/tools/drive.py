@@ -27,7 +27,7 @@ from mapspeak.server.tools.asking import (
     tell_progress,
 )
 from mapspeak.server.tools.places import OnePlace
-from mapspeak.server.tools.sightings import look_ahead
+from mapspeak.server.tools.sightings import Camera, look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
@@ -66,7 +66,7 @@ TurnTo = Annotated[
 NPictures = Annotated[
     int | None,
     Field(
-        description="evenly spread all around; as many as leave no gap when left out",
+        description="all around; else as many as leave no gap",
         ge=2,
         le=12,
         strict=True,
@@ -125,7 +125,6 @@ class DriveTools:
         "Wait for a drive",
         ToolEffect.READS,
         has_report=True,
-        leads="Use it after {navigate_to}.",
     )
     async def wait_for_goal(
         self, context: Context, goal_id: GoalId = None, wait_s: Wait = 20.0
@@ -233,13 +232,9 @@ class ViewTools:
             yaw_rad = here.yaw_rad + math.radians(by_deg)
         return DriveAnswer.of(await self._turn(context, yaw_rad, LONGEST_WAIT_S))
 
-    @tool(
-        "Look all around",
-        ToolEffect.MOVES,
-        leads="{look_through_camera} takes one picture without moving.",
-    )
+    @tool("Look all around", ToolEffect.MOVES)
     async def look_around(
-        self, context: Context, n_pictures: NPictures = None
+        self, context: Context, n_pictures: NPictures = None, camera: Camera = None
     ) -> list[str | Image]:
         """Turn the robot where it stands and take a camera picture at each of several headings.
 
@@ -247,12 +242,13 @@ class ViewTools:
         """
         robot = self._session.robot
         deadline_s = robot.now_s + LONGEST_WAIT_S
-        first = await look_ahead(self._session)
+        first = await look_ahead(self._session, camera)
+        here = (await robot.fetch_pose()).pose
         n_pictures = n_pictures or _count_all_around(first.picture)
         what = f"turn in place for {n_pictures} pictures"
         scope = ApprovalScope(what=what, n_drives=n_pictures - 1, duration_s=LONGEST_WAIT_S)
         shown: list[str | Image] = [first.text, first.image]
-        for yaw_rad in spread_headings(first.picture.pose.yaw_rad, n_pictures)[1:]:
+        for yaw_rad in spread_headings(here.yaw_rad, n_pictures)[1:]:
             left_s = deadline_s - robot.now_s
             if left_s < LEAST_TURN_S:
                 return [*shown, _say_rest(yaw_rad, "the time for one call is over")]
@@ -262,7 +258,7 @@ class ViewTools:
                 await self._session.drives.cancel(report.drive.goal_id)
                 why = say_cause(report.status.cause) or f"the turn is {report.status.state}"
                 return [*shown, _say_rest(yaw_rad, why)]
-            sighting = await look_ahead(self._session)
+            sighting = await look_ahead(self._session, camera)
             shown += [sighting.text, sighting.image]
         return shown
 

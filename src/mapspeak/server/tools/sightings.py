@@ -3,15 +3,19 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import anyio
 from mcp.server.mcpserver import Image
+from pydantic import Field
 
 from mapspeak.errors import LinkError
 from mapspeak.memory import LaserRing, PictureReading, TakenPicture, build_ring
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
+
+Camera = Annotated[str | None, Field(description="by name; else front", max_length=60)]
 
 
 async def fetch_ring(robot: Robot) -> LaserRing | None:
@@ -36,7 +40,7 @@ async def fetch_ring(robot: Robot) -> LaserRing | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSighting:
-    """A picture of the front camera, and its caption.
+    """A picture of a camera, and its caption.
 
     Attributes:
         text: Where it was taken, and the reports of the robot's own detector in it.
@@ -54,15 +58,21 @@ class CameraSighting:
         return Image(data=self.picture.data, format=self.picture.media_type.partition("/")[2])
 
 
-async def look_ahead(session: Session) -> CameraSighting:
-    """Take a picture with the robot's front camera, names it, and keep it as an episode.
+async def look_ahead(session: Session, camera: str | None = None) -> CameraSighting:
+    """Take a picture with a camera, name it, and keep it as an episode.
+
+    Args:
+        camera: By its name; None for the one that looks ahead, through which the detector looks.
 
     Raises:
-        LinkError: It has none, or it cannot be reached.
+        LinkError: There is no such camera, or it cannot be reached.
     """
     robot = session.robot
-    picture = await robot.fetch_picture()
-    detector = robot.description.detector
+    picture = await robot.fetch_picture(camera)
+    cameras = robot.description.cameras
+    name = robot.description.find_camera(camera) if camera else next(iter(cameras), "")
+    is_ahead = not camera or name == cameras[0]
+    detector = robot.description.detector if is_ahead else None
     detections: tuple[Detection, ...] = ()
     if detector is not None:
         detections = await robot.fetch_detections()
@@ -80,9 +90,11 @@ async def look_ahead(session: Session) -> CameraSighting:
         readings=tuple(_read(detector, detections)),
         laser=laser,
         reported=None if detector is None else labels,
+        is_ahead=is_ahead,
     )
     taken = session.pictures.add(taken, picture.data, media_type=picture.media_type)
-    lines = [_say_picture(taken.id, picture)]
+    which = f", camera {name!r}" if camera else ""
+    lines = [_say_picture(f"{taken.id}{which}", picture)]
     lines += [say_pose_doubt(picture.pose_doubt)] if picture.pose_doubt else []
     lines += [] if detector is None else _say_detections(detector, detections)
     lines += [kept.fault] if kept.fault else []

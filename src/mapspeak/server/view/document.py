@@ -99,7 +99,8 @@ class RobotView(ViewPart):
         doubt: Why it may be elsewhere; empty for a fresh pose on the map.
         held_by: The holder and the reason; None where it is not held.
         waiting: The commands that wait for approval, by their ids.
-        camera_fov_deg: How wide its camera sees; None until a picture has told.
+        cameras: Their names, the one that looks ahead first.
+        camera_fov_deg: How wide that one sees; None until a picture has told.
     """
 
     pose: PoseView | None
@@ -109,6 +110,7 @@ class RobotView(ViewPart):
     held_by: str | None = None
     drive: DriveView | None = None
     waiting: Mapping[str, str] = {}
+    cameras: tuple[str, ...] = ()
     camera_fov_deg: float | None = None
 
 

@@ -70,7 +70,7 @@ class ViewFeed:
         self._missions = MissionsView()
         self._has_failed = False
         self._looking = anyio.Lock()
-        self._picture: tuple[CameraPicture, float] | None = None
+        self._pictures: dict[str, tuple[CameraPicture, float]] = {}
         calls.tell = self._tell_call
 
     @asynccontextmanager
@@ -151,19 +151,23 @@ class ViewFeed:
                 return self._drawn[name]
         return None
 
-    async def see(self) -> CameraPicture:
-        """Return what the camera sees: one picture for all pages that ask at about the same time.
+    async def see(self, camera: str | None = None) -> CameraPicture:
+        """Return what a camera sees; by its name, or ahead.
+
+        Pages that ask at about the same time are given one picture.
 
         Raises:
             LinkError: It gives none.
         """
         async with self._looking:
-            now_s = anyio.current_time()
-            if self._picture is None or now_s - self._picture[1] > PICTURE_S:
-                picture = await self.session.robot.fetch_picture()
-                self._picture = picture, now_s
-                self.robot.camera_fov_rad = picture.horizontal_fov_rad or self.robot.camera_fov_rad
-            return self._picture[0]
+            now_s, robot = anyio.current_time(), self.session.robot
+            name = robot.description.find_camera(camera) if camera else ""
+            if name not in self._pictures or now_s - self._pictures[name][1] > PICTURE_S:
+                picture = await robot.fetch_picture(name or None)
+                self._pictures[name] = picture, now_s
+                if not name and picture.horizontal_fov_rad is not None:
+                    self.robot.camera_fov_rad = picture.horizontal_fov_rad
+            return self._pictures[name][0]
 
     def tell_word(self, said: str, *, page: str) -> None:
         """Tell all pages of a person's command at one of them."""

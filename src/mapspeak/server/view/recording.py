@@ -148,7 +148,7 @@ class SessionRecord:
             tasks.start_soon(_repeat, self._record_pose, POSE_S)
             tasks.start_soon(_repeat, self._record_map, PERIOD_S)
             tasks.start_soon(_repeat, self._record_markers, PERIOD_S)
-            tasks.start_soon(_repeat, self._record_picture, CAMERA_S)
+            tasks.start_soon(_repeat, self._record_pictures, CAMERA_S)
 
     def _note_call(self, call: CallView) -> None:
         if call.is_over:
@@ -185,12 +185,14 @@ class SessionRecord:
             message = write_markers(marks, frame_id=self._map_frame, dialect=ROS2)
             self._write(self._markers, MARKER_ARRAY, message)
 
-    async def _record_picture(self) -> None:
-        taken = await self._session.robot.fetch_picture()
-        header = write_header(CAMERA_FRAME, taken.stamp_s, dialect=ROS2)
-        form = taken.media_type.removeprefix("image/")
-        message = {"header": header, "format": form, "data": taken.data}
-        self._write(f"{self._prefix}/camera/compressed", "sensor_msgs/CompressedImage", message)
+    async def _record_pictures(self) -> None:
+        robot = self._session.robot
+        for camera in (None, *robot.description.cameras[1:]):
+            taken, name = await robot.fetch_picture(camera), camera or CAMERA_FRAME
+            header = write_header(name, taken.stamp_s, dialect=ROS2)
+            form = taken.media_type.removeprefix("image/")
+            message = {"header": header, "format": form, "data": taken.data}
+            self._write(f"{self._prefix}/{name}/compressed", "sensor_msgs/CompressedImage", message)
 
     @property
     def _map_frame(self) -> str:

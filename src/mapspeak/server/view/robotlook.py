@@ -2,7 +2,7 @@
 
 import math
 
-from mapspeak.errors import MapspeakError
+from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.server.text.wording import say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
 from mapspeak.server.view.document import DriveView, PoseView, RobotView, Spot
@@ -40,12 +40,20 @@ class RobotLook:
             held_by=None if guard is None else guard.hold.read(),
             drive=await self._describe_drive(),
             waiting={} if guard is None else guard.approvals.fresh_room().list_waiting(),
+            cameras=self._name_cameras(),
             camera_fov_deg=self._find_fov_deg(),
         )
 
+    def _name_cameras(self) -> tuple[str, ...]:
+        try:
+            return self._session.robot.description.cameras
+        except LinkError:
+            return ()
+
     def _find_fov_deg(self) -> float | None:
         """Return how wide the camera sees, as a page's or a tool's latest picture told."""
-        latest = self._session.pictures.latest
+        ahead = (taken for taken in reversed(self._session.pictures.taken) if taken.is_ahead)
+        latest = next(ahead, None)
         fov_rad = self.camera_fov_rad or (None if latest is None else latest.horizontal_fov_rad)
         return None if fov_rad is None else round(math.degrees(fov_rad), 1)
 

@@ -174,7 +174,7 @@ class LiveSite:
         try:
             if not feed.session.robot.description.has_camera:
                 raise HTTPException(HTTPStatus.NOT_FOUND, "This robot has no camera.")
-            picture = await feed.see()
+            picture = await feed.see(request.query_params.get("camera"))
         except LinkError as error:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
         fresh = {"cache-control": "no-store"}

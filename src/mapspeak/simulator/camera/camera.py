@@ -27,6 +27,9 @@ AnyFloats = NDArray[np.floating[Any]]
 
 HORIZONTAL_FOV_RAD = math.radians(85.0)
 CAMERA_HEIGHT_M = 1.1
+FRONT, REAR = "front", "rear"
+CAMERAS = {FRONT: Pose(0.0, 0.0), REAR: Pose(0.0, 0.0, math.pi)}
+"""By their names: where each looks, on the robot. All are alike, on one mast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

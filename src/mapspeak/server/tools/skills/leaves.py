@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from mapspeak.driving.drivereport import DriveReport
+from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.memory.episodes.observation import ObservationKind
 from mapspeak.places.views.sights import choose_view, is_there
@@ -53,6 +54,7 @@ LOOK = SkillSpec(
     timeout_s=HOUR_S,
     parameters=(
         SkillParameter("place", TEXT, description="ahead where left out", most=200, default=AHEAD),
+        SkillParameter("camera", TEXT, description="another than the front one", most=60),
     ),
 )
 NOTE = SkillSpec(
@@ -147,8 +149,12 @@ class Leaves:
 
     async def _look(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Drive to a clear view, and give the picture's id and what the detector reports in it."""
-        session, place = self._session, given["place"]
+        session, place, camera = self._session, given["place"], given.get("camera")
         if place.casefold() != AHEAD:
+            if camera is not None:
+                raise GoalError(
+                    "Only the front camera is turned to a place.", hint="Leave place or camera out."
+                )
             with session.drives.preparing() as ticket:
                 world = await session.fetch_world_model()
                 half_view_rad = session.pictures.half_view_rad
@@ -158,7 +164,7 @@ class Leaves:
                     outcome = await self._drive_to(goal.pose, goal.title, ticket, on_progress)
                     if outcome.state is not SkillState.SUCCEEDED:
                         return outcome
-        sighting = await look_ahead(session)
+        sighting = await look_ahead(session, camera)
         taken, picture = session.pictures.latest, sighting.picture
         picture_id = "" if taken is None else taken.id
         media = picture.media_type.partition("/")[2]

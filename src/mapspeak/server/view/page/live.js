@@ -50,6 +50,7 @@ async function showLive() {
     latest = data;
     map.follow(data);
     commands.showWaiting(data.waiting);
+    showCameras(data.cameras);
     showState();
   });
 
@@ -91,7 +92,9 @@ function watchCamera(base, isConnected) {
     if (!isWaiting && byId("watching").checked && document.visibilityState === "visible" && isConnected()) {
       isWaiting = true;
       const next = new Image();
-      next.src = `${base}/camera?at=${Date.now()}`;
+      const asked = new URLSearchParams({ at: String(Date.now()) });
+      if (byId("cameras").selectedIndex > 0) asked.set("camera", byId("cameras").value);
+      next.src = `${base}/camera?${asked}`;
       try {
         await next.decode();
         camera.src = next.src;
@@ -106,6 +109,15 @@ function watchCamera(base, isConnected) {
   }
   look();
   setInterval(look, 1000);
+}
+
+/** Let a person choose among several cameras. @param {string[]} names */
+function showCameras(names) {
+  const choice = byId("cameras");
+  if (names.join() === Array.from(choice.options, (each) => each.value).join()) return;
+  const chosen = choice.value;
+  choice.replaceChildren(...names.map((name) => new Option(legible(name), name, false, name === chosen)));
+  choice.hidden = names.length < 2;
 }
 
 const SIGNS = { running: "▶", succeeded: "✓", failed: "✗", cancelled: "■", timed_out: "✗" };
