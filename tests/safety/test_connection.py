@@ -1,3 +1,5 @@
+import inspect
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -288,7 +290,8 @@ async def test_what_failed_is_noted_as_given_up(tmp_path: Path) -> None:
 
 
 def test_every_member_of_the_port_is_guarded_or_named_as_harmless(tmp_path: Path) -> None:
-    port = {name for name in vars(RosConnection) if not name.startswith("_")}
+    members = [(*vars(part), *inspect.get_annotations(part)) for part in RosConnection.__mro__]
+    port = {name for name in chain(*members) if not name.startswith("_")}
     guarded_ones = {name for name in vars(GuardedConnection) if not name.startswith("_")} & port
     assert guarded_ones | HARMLESS == port
     assert guarded_ones & HARMLESS == set()

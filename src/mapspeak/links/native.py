@@ -22,11 +22,11 @@ from mapspeak.links.endpoints import (
     whole_type,
 )
 from mapspeak.links.goals import ActionWire, ServiceClient
-from mapspeak.ros.activity import ActionGoal
-from mapspeak.ros.link import RosLink, TopicRequest, check_name, wrong_type
+from mapspeak.ros.activity import ActionGoal, Subscription
+from mapspeak.ros.link import check_name, wrong_type
 from mapspeak.ros.messages.fields import BULKY, TYPE, Dialect, Message, bare_type
 from mapspeak.ros.patience import Patience
-from mapspeak.ros.port import OwnEnds, RosGraph
+from mapspeak.ros.port import RosConnection, RosGraph
 
 SEND_GOAL = "/_action/send_goal"
 DEPTH, BULKY_DEPTH = 200, 5
@@ -64,25 +64,23 @@ class Writer(Protocol):
 
 
 @dataclass(slots=True, eq=False)
-class NativeRequest(TopicRequest):
-    """The request for a topic, and its reader.
+class Reading:
+    """A topic that is being read.
 
     Attributes:
-        reader: The link's own; None while the topic is not read.
-        quality: The quality of service in which it is read now.
+        reader: The link's own.
+        quality: The quality of service in which it is read.
         writers: The ids of its writers when the reading began.
         decoded_s: When the last message was decoded, by the monotonic clock.
-        has_learned: The robot was asked for its type already.
     """
 
+    quality: object
+    writers: frozenset[bytes]
     reader: Any = None
-    quality: object = None
-    writers: frozenset[bytes] = frozenset()
     decoded_s: float = float("-inf")
-    has_learned: bool = False
 
 
-class NativeLink(RosLink[NativeRequest]):
+class NativeLink(RosConnection):
     """Reads and writes topics, calls services, and pursues goals.
 
     A topic is read only once it has a writer, because the reader's QoS depends on the writer's: a
@@ -98,23 +96,10 @@ class NativeLink(RosLink[NativeRequest]):
     server_s = 2.0
 
     def __init__(self, types: MessageTypes, patience: Patience) -> None:
-        super().__init__(NativeRequest, patience)
+        super().__init__(patience)
         self._types = types
         self._advertised: dict[str, tuple[str, Any]] = {}
         self._actions: dict[str, ActionWire] = {}
-
-    @property
-    def lost_for_s(self) -> float | None:
-        """None: there is no connection to lose."""
-        return None
-
-    @property
-    def own_ends(self) -> OwnEnds:
-        """Nothing: such a link leaves its own node out of the graph."""
-        return OwnEnds()
-
-    def clear_the_way(self) -> None:
-        """Do nothing: ROS 2 itself does not queue messages behind earlier ones."""
 
     # --- implemented by each link
 
@@ -147,7 +132,7 @@ class NativeLink(RosLink[NativeRequest]):
         """Write no longer."""
 
     @abstractmethod
-    def _learn(self, request: NativeRequest) -> None:
+    def _learn(self, subscription: Subscription) -> None:
         """Find out a type that is unknown, or known in another version; it may raise."""
 
     @abstractmethod
@@ -173,15 +158,15 @@ class NativeLink(RosLink[NativeRequest]):
 
     # --- reading
 
-    def _begin(self, request: NativeRequest) -> None:
+    def _begin(self, subscription: Subscription) -> None:
         """Read it in the best quality that all of its writers offer."""
-        topic = request.subscription.topic
+        topic, reading = subscription.topic, subscription.reader
         writers = self._writers_of(topic)
         if not writers:
             return
-        type_name = request.subscription.type_name or writers[0].type_name
+        type_name = subscription.type_name or writers[0].type_name
         if not self._types.knows(type_name):
-            self._learn(request)
+            self._learn(subscription)
             return
         quality = self._quality(
             is_reliable=all(each.is_reliable for each in writers),
@@ -189,31 +174,34 @@ class NativeLink(RosLink[NativeRequest]):
             depth=BULKY_DEPTH if bare_type(type_name) in BULKY else DEPTH,
         )
         keys = frozenset(each.key for each in writers)
-        is_new = self.reads_anew and not keys <= request.writers
-        if request.quality == quality and not is_new:
+        is_known = not self.reads_anew or (reading is not None and keys <= reading.writers)
+        if reading is not None and reading.quality == quality and is_known:
             return
-        self._end(request)
-        decode, take = partial(self._decode, request, type_name), partial(self._take, request)
-        request.reader = self._read(topic, type_name, quality, decode, take)
-        request.quality, request.writers = quality, keys
+        self._end(subscription)
+        reading = subscription.reader = Reading(quality, keys)
+        decode = partial(self._decode, reading, subscription.throttle_ms / 1e3, type_name)
+        take = partial(self._take, subscription)
+        reading.reader = self._read(topic, type_name, quality, decode, take)
 
-    def _end(self, request: NativeRequest) -> None:
-        if request.reader is not None:
-            self._end_reading(request.reader)
-        request.reader = request.quality = None
+    def _end(self, subscription: Subscription) -> None:
+        if subscription.reader is not None:
+            self._end_reading(subscription.reader.reader)
+        subscription.reader = None
 
-    def _decode(self, request: NativeRequest, type_name: str, data: bytes) -> Message | None:
+    def _decode(
+        self, reading: Reading, throttle_s: float, type_name: str, data: bytes
+    ) -> Message | None:
         now_s = time.monotonic()
-        if now_s - request.decoded_s < request.throttle_ms / 1e3:
+        if now_s - reading.decoded_s < throttle_s:
             return None
-        request.decoded_s = now_s
+        reading.decoded_s = now_s
         return self._types.decode(type_name, data)
 
-    def _take(self, request: NativeRequest, sample: Sample) -> None:
+    def _take(self, subscription: Subscription, sample: Sample) -> None:
         if sample.refusal is not None:
-            self._learn(request)
+            self._learn(subscription)
         elif sample.content is not None:
-            request.subscription.take(sample.content)
+            subscription.take(sample.content)
 
     # --- writing
 
@@ -233,7 +221,7 @@ class NativeLink(RosLink[NativeRequest]):
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish once the known subscribers are connected."""
-        self.announcements.use(topic)
+        self._tell_first(topic)
         type_name, writer = self._wanted(topic)
         listeners = self._readers_of(topic)
         if listeners and not self._types.knows(type_name):

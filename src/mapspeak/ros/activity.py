@@ -22,16 +22,21 @@ class Subscription:
         n_received: Since the subscription began, over all connections.
         begun_s: Since when we have listened, by the event loop's clock.
         arrived_s: When the newest came, by the event loop's clock.
+        n_users: Who share it; the last one to leave ends it.
+        n_renewals: How often it was begun anew.
+        reader: The link's own; None while the topic is not read.
     """
 
-    def __init__(self, topic: str, *, type_name: str | None) -> None:
+    def __init__(self, topic: str, *, type_name: str | None, throttle_ms: int = 0) -> None:
         self.topic = topic
         self.type_name = type_name
+        self.throttle_ms = throttle_ms
         self.latest: Message | None = None
         self.n_received = 0
         self.begun_s = anyio.current_time()
         self.arrived_s = float("-inf")
-        self.n_users = 0
+        self.n_users = self.n_renewals = 0
+        self.reader: Any = None
         self._listeners: list[Listener] = []
         self._news = anyio.Event()
 

@@ -38,10 +38,13 @@ class ParameterServices(ABC):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return the answer of a service."""
+        """Return the answer of a service.
+
+        Where no type is given it is looked up; where no limit is, the usual one is taken.
+        """
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Return the names of a node's parameters, in their order."""
+        """Return the names of a node's parameters; ROS 1 keeps them below the node's name."""
         answer = await self._ask(node, "list_parameters", "ListParameters", {"depth": 0})
         names = _part(answer.get("result"), "names", node)
         return tuple(sorted(str(name) for name in names))
@@ -61,6 +64,9 @@ class ParameterServices(ABC):
         """Set a node's parameter; convert a whole number to a double where the node keeps doubles.
 
         None deletes it, which a node allows only for what it has not declared.
+
+        Raises:
+            LinkError: The node refuses it, and says why.
         """
         written: dict[str, Any] = {"type": NOT_SET}
         if value is not None:

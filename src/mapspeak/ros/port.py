@@ -2,14 +2,20 @@
 
 import difflib
 import uuid
+from abc import abstractmethod
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Protocol
+from functools import partial
+from typing import Any
+
+from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
+from mapspeak.ros.link import Advertising, say_again
 from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.ros.parameters import ParameterServices
 from mapspeak.ros.patience import Patience
 
 
@@ -92,46 +98,62 @@ class OwnEnds:
     hears: frozenset[str] = frozenset()
 
 
-class RosConnection(Protocol):
+class RosConnection(Advertising, ParameterServices):
     """One ROS system, kept connected. Waiting is limited in wall time; a limit closes nothing.
 
     Methods raise `LinkError` when the system cannot be reached or does not answer, and when a
-    message, a name or a type is invalid.
+    message, a name or a type is invalid. What all links have in common stands here.
+
+    Attributes:
+        patience: The time limits of this connection.
+        started: Everything that was started over this connection: a stop ends it.
     """
 
+    patience: Patience
+    started: Started
+
+    def __init__(self, patience: Patience) -> None:
+        super().__init__()
+        self.patience = patience
+        self.started = Started()
+        self._subscriptions: dict[str, Subscription] = {}
+        self._tasks: TaskGroup | None = None
+
     @property
+    @abstractmethod
     def link(self) -> LinkName:
         """How we are connected."""
 
     @property
-    def patience(self) -> Patience:
-        """The time limits of this connection."""
-
-    @property
+    @abstractmethod
     def is_open(self) -> bool:
         """True when something can be sent at once."""
 
     @property
+    @abstractmethod
     def connected_for_s(self) -> float | None:
         """Since when topics and goals have been connected, in wall time; None while not."""
 
     @property
     def lost_for_s(self) -> float | None:
         """Since when the connection has been lost, in wall time; None while there is one."""
+        return None
 
     @property
     def own_ends(self) -> OwnEnds:
         """Our own part of the graph: answers about the graph do not take it for others'."""
-
-    @property
-    def started(self) -> Started:
-        """Everything that was started over this connection: a stop ends it."""
+        return OwnEnds()
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run something in the background until the connection is closed."""
+        if self._tasks is not None:
+            self._tasks.start_soon(work)
 
+    @abstractmethod
     async def wait_until_connected(self) -> None:
         """Return at once, or when the connection is open again."""
+
+    # --- topics
 
     def subscribe(
         self, topic: str, *, type_name: str | None = None, throttle_ms: int = 0
@@ -139,117 +161,124 @@ class RosConnection(Protocol):
         """Return the subscription to a topic; begin one where there is none yet.
 
         The type is as this ROS writes it; None looks it up. Throttling keeps a least time between
-        two messages.
+        two messages; the first request sets it.
         """
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            self._check(topic, type_name)
+            subscription = Subscription(topic, type_name=type_name, throttle_ms=throttle_ms)
+            self._begin(subscription)
+            self._subscriptions[topic] = subscription
+        subscription.n_users += 1
+        return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
         """End one use of a subscription; the last one ends it at the robot too."""
+        if self._subscriptions.get(subscription.topic) is subscription:
+            subscription.n_users -= 1
+            if subscription.n_users == 0:
+                del self._subscriptions[subscription.topic]
+                self._end(subscription)
 
     def renew(self, subscription: Subscription) -> None:
         """Subscribe again, perhaps in another way: a latched message may have been missed."""
+        if self._subscriptions.get(subscription.topic) is subscription:
+            self._end(subscription)
+            subscription.n_renewals += 1
+            self._begin(subscription)
 
-    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
-        """Say that we will publish; the robot needs a moment until it listens.
+    @abstractmethod
+    def _begin(self, subscription: Subscription) -> None:
+        """Read a topic, or see to it that it is read once that can be done."""
 
-        A late subscriber of a latched topic ("transient local") gets the last message.
-        """
+    @abstractmethod
+    def _end(self, subscription: Subscription) -> None:
+        """Read a topic no longer."""
 
-    def unadvertise(self, topic: str) -> None:
-        """Take back an advertisement; do nothing for a topic that was not advertised."""
-
-    def advertise_late(self) -> None:
-        """Tell the robot of each topic advertised from now on only with its first message.
-
-        For a robot that is only watched: it should not look as if we drove it. Zero velocity is
-        then repeated for a second, until the robot has discovered our publisher.
-        """
-
-    def advertise_early(self) -> None:
-        """Tell the robot at once of all advertised topics, now and from now on.
-
-        For clients that may move it, so that a stop is received at once. This is the default.
-        """
-
+    @abstractmethod
     async def publish(self, topic: str, message: Message) -> None:
         """Publish on an advertised topic."""
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
         """Publish at once by every way that is open, and return how many: for a stop."""
+        is_first = self._tell_first(topic)
+        send = self._prepare(topic, message)
+        if is_first:
+            self.start_soon(partial(say_again, send))
+        return send()
 
-    async def call_service(
-        self,
-        service: str,
-        arguments: Mapping[str, Any] | None = None,
-        *,
-        type_name: str | None = None,
-        timeout_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Return the answer of a service.
+    @abstractmethod
+    def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
+        """Return a function that publishes over each open connection and returns their number."""
 
-        Where no type is given it is looked up; where no limit is, the usual one is taken.
+    def clear_the_way(self) -> None:
+        """Make sure that earlier messages do not delay the next one: for a stop.
+
+        ROS 2 itself does not queue messages behind earlier ones.
         """
 
+    # --- actions
+
+    @abstractmethod
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action of ROS 2 and return the goal, updated as its state changes."""
 
+    @abstractmethod
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Ask the server to cancel a goal; the goal's `end` tells whether it did.
 
         A withdrawn goal blocks no other from then on; its news are still passed on.
         """
 
-    def clear_the_way(self) -> None:
-        """Make sure that earlier messages do not delay the next one: for a stop."""
+    # --- the graph
 
+    @abstractmethod
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are."""
 
+    @abstractmethod
     async def fetch_topics(self) -> Mapping[str, str]:
         """Return the type of each topic, as "package/Type"; costs less than the whole graph."""
 
+    @abstractmethod
     async def fetch_time_s(self) -> float | None:
         """Return robot time; None where the robot does not say."""
 
+    @abstractmethod
     async def fetch_nodes(self) -> tuple[str, ...]:
         """Return the full names of all nodes, in their order."""
 
+    @abstractmethod
     async def fetch_node(self, node: str) -> NodeLinks:
         """Return the topics and services that a node publishes, subscribes to and serves."""
 
+    @abstractmethod
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish on a topic."""
 
+    @abstractmethod
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that listen to a topic."""
 
+    @abstractmethod
     async def fetch_services(self) -> tuple[str, ...]:
         """Return the full names of all services, in their order."""
 
+    @abstractmethod
     async def fetch_service_type(self, service: str) -> str:
         """Return a service's type, as "package/Type"."""
 
+    @abstractmethod
     async def fetch_action_type(self, action: str) -> str:
         """Return an action's type, as "package/Type"."""
 
+    @abstractmethod
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
         """Return the .msg texts of a type and of every type within it; empty where unknown.
 
         They are by name as "package/Type", the type itself first. A service has the two names
         "package/Type_Request" and "package/Type_Response", an action "package/Type_Goal",
         "package/Type_Result" and "package/Type_Feedback".
-        """
-
-    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Return the names of a node's parameters; ROS 1 keeps them below the node's name."""
-
-    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
-        """Return the value of a node's parameter; None where it is not set."""
-
-    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Set a node's parameter; None deletes it.
-
-        Raises:
-            LinkError: The node refuses it, and says why.
         """
 
 

@@ -1,10 +1,11 @@
 """A ROS 2 domain over DDS as a connection, and the robot behind it opened."""
 
 import logging
-from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from collections.abc import AsyncGenerator, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
+from weakref import WeakSet
 
 import anyio
 from anyio.abc import TaskGroup
@@ -32,7 +33,8 @@ from mapspeak.links.endpoints import (
     nobody_serves,
     unknown,
 )
-from mapspeak.links.native import SEND_GOAL, NativeLink, NativeRequest
+from mapspeak.links.native import SEND_GOAL, NativeLink
+from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import plain_errors
 from mapspeak.ros.patience import USUAL_PATIENCE, Patience
@@ -89,7 +91,8 @@ class DdsConnection(NativeLink):
             self._participant.key, on_change=self._note_change, framing_of=framing_of
         )
         self._services: dict[str, DdsService] = {}
-        self._tasks: TaskGroup | None = None
+        self._learned = WeakSet[Subscription]()
+        """Those of whose type the robot was asked already."""
         self._found_s: float | None = None
 
     @property
@@ -112,11 +115,6 @@ class DdsConnection(NativeLink):
     def distro(self) -> str:
         """Humble by its longer ids; empty for all others."""
         return HUMBLE if self.discovery.has_long_ids else ""
-
-    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Run something in the background until the connection is closed."""
-        if self._tasks is not None:
-            self._tasks.start_soon(work)
 
     async def start(self, tasks: TaskGroup) -> None:
         """Enter the domain, and return when its participants have been found.
@@ -191,22 +189,21 @@ class DdsConnection(NativeLink):
 
     # --- types
 
-    def _learn(self, request: NativeRequest) -> None:
+    def _learn(self, subscription: Subscription) -> None:
         """Ask for a type that we do not know, or know in another version, until it is told once."""
-        if not request.has_learned:
-            request.has_learned = True
-            self.start_soon(partial(self._learn_and_renew, request))
+        if subscription not in self._learned:
+            self._learned.add(subscription)
+            self.start_soon(partial(self._learn_and_renew, subscription))
 
-    async def _learn_and_renew(self, request: NativeRequest) -> None:
+    async def _learn_and_renew(self, subscription: Subscription) -> None:
         # A node's services may be found after its topics, and a busy node may answer too late.
-        topic = request.subscription.topic
-        pause_s = FIRST_PAUSE_S
-        while self.requests.get(topic) is request:
+        topic, pause_s = subscription.topic, FIRST_PAUSE_S
+        while subscription.n_users:
             try:
                 # Whoever writes now: the node that was asked before may have gone.
                 for writer in self._writers_of(topic)[:1]:
                     await self.ask_type(writer)
-                    self.renew(request.subscription)
+                    self.renew(subscription)
                     return
             except LinkError as error:
                 if pause_s == FIRST_PAUSE_S:
@@ -323,9 +320,9 @@ class DdsConnection(NativeLink):
             self._found_s = anyio.current_time()
         for each in self.discovery.ends_of(dds_name):
             self.types.take_hash(each.type_name, each.type_hash)
-        for request in self.requests.values():
-            if dds_topic(request.subscription.topic) == dds_name:
-                self._begin(request)
+        for subscription in self._subscriptions.values():
+            if dds_topic(subscription.topic) == dds_name:
+                self._begin(subscription)
         for action in self._actions:
             if reply_topic(action + SEND_GOAL) == dds_name:
                 self._note_servers(action)

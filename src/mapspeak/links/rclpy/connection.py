@@ -1,6 +1,6 @@
 """A ROS 2 system over rclpy, as one of its nodes sees it."""
 
-from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Mapping
+from collections.abc import AsyncGenerator, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Protocol
 
@@ -12,10 +12,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
 from mapspeak.links.endpoints import Decode, Endpoint, Take, is_hidden, nobody_serves, unknown
-from mapspeak.links.native import NativeLink, NativeRequest
+from mapspeak.links.native import NativeLink
 from mapspeak.links.rclpy.endpoints import RclpyReader, RclpyService, RclpyWriter
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
+from mapspeak.ros.activity import Subscription
 from mapspeak.ros.link import check_name, plain_errors
 from mapspeak.ros.messages.fields import bare_type
 from mapspeak.ros.patience import Patience
@@ -75,13 +76,9 @@ class Ros2Connection(NativeLink):
         """Since when others have been found, in wall time; None before."""
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
-    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Run something in the background until the connection is closed."""
-        self._tasks.start_soon(work)
-
     async def start(self) -> None:
         """Return when the participants have been found, or there are none."""
-        self._tasks.start_soon(self._watch)
+        self.start_soon(self._watch)
         if await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
             with anyio.move_on_after(LONGEST_LOOK_S):
                 await wait_until_quiet(self)
@@ -133,9 +130,9 @@ class Ros2Connection(NativeLink):
     def _check_type(self, type_name: str) -> None:
         find_message(type_name)
 
-    def _learn(self, request: NativeRequest) -> None:
+    def _learn(self, subscription: Subscription) -> None:
         """Raise `LinkError`: a type that is not installed here cannot be learned."""
-        topic = request.subscription.topic
+        topic = subscription.topic
         for writer in self._writers_of(topic):
             find_message(writer.type_name)
         raise LinkError(f"A message on {topic} cannot be read.", hint="Check its publisher.")
@@ -255,10 +252,10 @@ class Ros2Connection(NativeLink):
     async def _watch(self) -> None:
         while True:
             # What ROS cannot tell now is asked again.
-            for request in list(self.requests.values()):
+            for subscription in list(self._subscriptions.values()):
                 # An unreadable topic stays silent; its subscribers are told so.
                 with suppress(LinkError), errors_of_ros("ROS does not tell who writes"):
-                    self._begin(request)
+                    self._begin(subscription)
             for action in list(self._actions):
                 with suppress(LinkError), errors_of_ros("ROS does not tell who serves"):
                     self._note_servers(action)

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 
 import anyio
 import anyio.lowlevel
@@ -13,14 +12,11 @@ from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.connection import SocketConnection
 from mapspeak.links.rosbridge.protocol.conversation import (
-    Encoding,
     Event,
     ServiceAnswered,
     write_operation,
 )
 from mapspeak.links.rosbridge.websocket import open_websocket
-from mapspeak.ros.link import TopicRequest
-from mapspeak.ros.messages.fields import BULKY, bare_type
 from mapspeak.ros.patience import Patience
 
 logger = logging.getLogger(__name__)
@@ -246,26 +242,3 @@ def _values_of(answer: ServiceAnswered, what: str) -> object:
         f"{what} failed: {reason or 'it gave no reason'}.",
         hint="Check its name, its type and the fields of the request.",
     )
-
-
-ENCODINGS = (Encoding.CBOR, Encoding.CBOR, Encoding.JSON)
-"""Of bulky messages: asked for so first, and again, and again.
-
-Where CBOR is beyond the server's size limit it is dropped in silence, while JSON comes in pieces.
-"""
-
-
-@dataclass(slots=True, eq=False)
-class RosbridgeTopicRequest(TopicRequest):
-    """The request for a topic."""
-
-    operation_id: str = ""
-    channel: Channel | None = None
-
-    @property
-    def encoding(self) -> Encoding:
-        """The encoding in which the server shall send messages."""
-        type_name = self.subscription.type_name
-        if type_name is None or bare_type(type_name) not in BULKY:
-            return Encoding.JSON
-        return ENCODINGS[min(self.n_renewals, len(ENCODINGS) - 1)]

@@ -1,7 +1,7 @@
 """The client of one robot: its subscriptions, publications, calls and goals."""
 
 import logging
-from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from collections.abc import AsyncGenerator, Callable, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
@@ -11,9 +11,10 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress
-from mapspeak.links.rosbridge.channel import Channel, RosbridgeTopicRequest
+from mapspeak.links.rosbridge.channel import Channel
 from mapspeak.links.rosbridge.protocol.codec import require_cbor
 from mapspeak.links.rosbridge.protocol.conversation import (
+    Encoding,
     Event,
     FrameRefused,
     GoalEnded,
@@ -23,10 +24,10 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     write_operation,
 )
 from mapspeak.links.rosbridge.rosapi import Rosapi
-from mapspeak.ros.activity import ActionEnd, ActionGoal
+from mapspeak.ros.activity import ActionEnd, ActionGoal, Subscription
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import NOTICE_S, plain_errors
-from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.messages.fields import BULKY, Message, bare_type
 from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import LinkName, OwnEnds, new_id
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
@@ -39,6 +40,11 @@ ROSAPI = "/rosapi/"
 UNKNOWN = "does not exist"
 """In rosbridge's words; such a call has not reached the service, so it may be repeated."""
 LOOK_AGAIN_S = 0.1
+ENCODINGS = (Encoding.CBOR, Encoding.CBOR, Encoding.JSON)
+"""Of bulky messages: asked for so first, and again, and again.
+
+Where CBOR is beyond the server's size limit it is dropped in silence, while JSON comes in pieces.
+"""
 
 
 class RosbridgeClient(Rosapi):
@@ -56,7 +62,6 @@ class RosbridgeClient(Rosapi):
         self._control = self._channel()
         self._urgent = self._channel()
         self._goals: dict[str, tuple[ActionGoal, Channel | None]] = {}
-        self._tasks: TaskGroup | None = None
         self._published_s = float("-inf")
         self.n_frames_refused = 0
         """Frames that could not be understood and were left away."""
@@ -95,12 +100,9 @@ class RosbridgeClient(Rosapi):
     @property
     def own_ends(self) -> OwnEnds:
         """The topics that rosbridge's node handles for us, and perhaps for other clients."""
-        return OwnEnds(node=NODE, publishes=self.announcements.told, hears=frozenset(self.requests))
-
-    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Run something in the background until the client is closed."""
-        if self._tasks is not None:
-            self._tasks.start_soon(work)
+        return OwnEnds(
+            node=NODE, publishes=frozenset(self._told), hears=frozenset(self._subscriptions)
+        )
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when both sockets are open again."""
@@ -125,20 +127,18 @@ class RosbridgeClient(Rosapi):
             tasks.start_soon(self._control.say_goodbye)
             tasks.start_soon(self._urgent.say_goodbye)
 
-    def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
-        """Say that we will publish; the robot needs a moment until it listens."""
-        known = self.announcements.type_of(topic) or type_name
-        if known != type_name:
+    def _check(self, topic: str, type_name: str | None) -> None:
+        known, _ = self._noted.get(topic, (type_name, False))
+        if known and type_name and bare_type(known) != bare_type(type_name):
             raise LinkError(
                 f"{topic} was advertised as {known}, not as {type_name}.",
                 hint="A topic has one type: look it up on the robot.",
             )
-        super().advertise(topic, type_name=type_name, is_latched=is_latched)
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish on an advertised topic."""
         text = write_operation("publish", topic=topic, msg=message)
-        if self.announcements.use(topic):
+        if self._tell_first(topic):
             await anyio.sleep(NOTICE_S)
         await self._free_for_topics().send(text, timeout_s=self.patience.answer_s)
         self._published_s = anyio.current_time()
@@ -266,35 +266,34 @@ class RosbridgeClient(Rosapi):
         is_free = self._carries_goal(self._control) or not self._carries_goal(self._urgent)
         return self._urgent if is_free else self._control
 
-    def _begin(self, request: RosbridgeTopicRequest) -> None:
-        subscription = request.subscription
-        request.operation_id = new_id()
+    def _begin(self, subscription: Subscription) -> None:
+        encoding = Encoding.JSON
+        if subscription.type_name and bare_type(subscription.type_name) in BULKY:
+            encoding = ENCODINGS[min(subscription.n_renewals, len(ENCODINGS) - 1)]
+        operation_id, channel = subscription.reader = new_id(), self._free_for_topics()
         text = write_operation(
             "subscribe",
-            id=request.operation_id,
+            id=operation_id,
             topic=subscription.topic,
             type=subscription.type_name,
-            compression=request.encoding.value,
+            compression=encoding.value,
             # Where some are left out, only the latest waits at the server.
-            throttle_rate=request.throttle_ms or None,
-            queue_length=1 if request.throttle_ms else None,
+            throttle_rate=subscription.throttle_ms or None,
+            queue_length=1 if subscription.throttle_ms else None,
         )
-        request.channel = self._free_for_topics()
-        request.channel.keep_standing(request.operation_id, text)
+        channel.keep_standing(operation_id, text)
 
-    def _end(self, request: RosbridgeTopicRequest) -> None:
-        text = write_operation(
-            "unsubscribe", id=request.operation_id, topic=request.subscription.topic
-        )
-        if request.channel is not None:
-            request.channel.end_standing(request.operation_id, text)
+    def _end(self, subscription: Subscription) -> None:
+        operation_id, channel = subscription.reader
+        text = write_operation("unsubscribe", id=operation_id, topic=subscription.topic)
+        channel.end_standing(operation_id, text)
 
     def _take(self, event: Event) -> None:
         match event:
             case Published():
-                request = self.requests.get(event.topic)
-                if request is not None:
-                    request.subscription.take(event.message)
+                subscription = self._subscriptions.get(event.topic)
+                if subscription is not None:
+                    subscription.take(event.message)
             case GoalFedBack():
                 known = self._goals.get(event.goal_id)
                 if known is not None:

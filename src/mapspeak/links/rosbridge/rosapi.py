@@ -5,7 +5,6 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.channel import RosbridgeTopicRequest
 from mapspeak.ros.definitions.texts import (
     KINDS,
     find_actions_of_ros1,
@@ -15,10 +14,9 @@ from mapspeak.ros.definitions.texts import (
     split_definition,
 )
 from mapspeak.ros.definitions.types import TypeBook
-from mapspeak.ros.link import RosLink
 from mapspeak.ros.messages.fields import Dialect, bare_type, read_stamp
 from mapspeak.ros.patience import Patience
-from mapspeak.ros.port import NodeLinks, RosGraph
+from mapspeak.ros.port import NodeLinks, RosConnection, RosGraph
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
 
@@ -120,7 +118,7 @@ ROSAPI_HINT = (
 )
 
 
-class Rosapi(RosLink[RosbridgeTopicRequest]):
+class Rosapi(RosConnection):
     """Asks rosapi, by whatever way services are called.
 
     Some of its services end or hang it on ROS 2 (message_details, get_param_names): these are
@@ -128,7 +126,7 @@ class Rosapi(RosLink[RosbridgeTopicRequest]):
     """
 
     def __init__(self, patience: Patience) -> None:
-        super().__init__(RosbridgeTopicRequest, patience)
+        super().__init__(patience)
         self._version: tuple[Dialect, str] | None = None
         self._definitions = DefinitionKeeper(self.call_service)
 
