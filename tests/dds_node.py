@@ -171,7 +171,7 @@ class DdsNode:
     def stop_serving(self, service: str) -> None:
         topic = f"rr{service}Reply"
         _, raw_writer = self._raw_writers.pop(topic)
-        self.participant.end_writing(raw_writer)
+        raw_writer.close()
 
     def introduce(self) -> None:
         """Tells which readers and writers are this node's, as the middlewares of ROS do."""

@@ -4,6 +4,7 @@ import math
 import threading
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from typing import cast
 
 import anyio
 import numpy as np
@@ -356,7 +357,7 @@ async def test_a_node_of_which_only_the_name_is_known_is_not_all_there_is() -> N
         def __init__(self) -> None:
             self.n_looks = 0
 
-        def nodes(self) -> tuple[str, ...]:
+        async def fetch_nodes(self) -> tuple[str, ...]:
             return ("/robot",)
 
         async def fetch_graph(self) -> RosGraph:
@@ -370,7 +371,7 @@ async def test_a_node_of_which_only_the_name_is_known_is_not_all_there_is() -> N
 
     system = Unfolding()
     with anyio.fail_after(PATIENCE_S):
-        await wait_until_quiet(system)
+        await wait_until_quiet(cast("RosConnection", system))
     assert system.n_looks == 3
 
 

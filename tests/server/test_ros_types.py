@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -10,6 +10,7 @@ from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server import open_rosbridge_server
 from rosserved import QUICK, on_our_server, served
 
@@ -85,7 +86,7 @@ async def test_a_type_that_the_ros_of_this_machine_lacks_is_to_be_installed(
     async with (
         open_rosbridge_server(SteppedRobot(two_rooms()), dialect=Dialect.ROS2) as server,
         open_client(RobotAddress(url=server.url), patience=QUICK) as client,
-        served(FakeRobot(), WithoutPackages(client), tmp_path) as caller,
+        served(FakeRobot(), cast("RosConnection", WithoutPackages(client)), tmp_path) as caller,
     ):
         said = await caller.refuse("ros_type", type="nav2_msgs/action/Spin")
     assert "the ROS on this machine does not have it" in said

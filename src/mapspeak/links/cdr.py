@@ -3,6 +3,7 @@
 import base64
 import struct
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -134,6 +135,31 @@ class Codec:
         if field.length is None:
             return value % 256 if field.type == "byte" else value
         return _as_array(field, value)
+
+
+class KnownTypes(ABC):
+    """The types that are known, as the robot has them."""
+
+    def __init__(self, book: TypeBook) -> None:
+        self._book = book
+        self._codec = Codec(book)
+
+    @abstractmethod
+    def knows(self, type_name: str) -> bool:
+        """Return True for a type whose messages can be encoded and decoded."""
+
+    def encode(self, type_name: str, message: Message) -> bytes:
+        """Return the bytes of a message; the fields it leaves out hold their defaults."""
+        return self._codec.encode(type_name, message)
+
+    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
+        """Return the message in some bytes."""
+        return self._codec.decode(type_name, data)
+
+    def _use(self, book: TypeBook) -> None:
+        # In this order: another thread may encode a type as soon as the book knows it.
+        self._codec = Codec(book, self._codec.store)
+        self._book = book
 
 
 class Store(Typestore):

@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
+import anyio
+
 from mapspeak.errors import LinkError
+from mapspeak.links.cdr import KnownTypes
 from mapspeak.links.endpoints import (
     Decode,
     Endpoint,
@@ -35,19 +38,11 @@ LISTENER_S = 1.0
 """Longest wait for a known subscriber to connect to an advertised topic."""
 
 
-class MessageTypes(Protocol):
-    """The types that are known, as the robot has them."""
+class Reader(Protocol):
+    """The reader of one topic."""
 
-    def knows(self, type_name: str) -> bool:
-        """Return True for a type whose messages can be encoded and decoded."""
-        ...
-
-    def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
-        """Return the bytes of a message."""
-        ...
-
-    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
-        """Return the message in some bytes."""
+    def close(self) -> None:
+        """Read no longer."""
         ...
 
 
@@ -60,6 +55,10 @@ class Writer(Protocol):
 
     async def wait_for_reader(self, *, timeout_s: float) -> bool:
         """Wait for a reader until the time is over; return whether there is one."""
+        ...
+
+    def close(self) -> None:
+        """Write no longer."""
         ...
 
 
@@ -76,7 +75,7 @@ class Reading:
 
     quality: object
     writers: frozenset[bytes]
-    reader: Any = None
+    reader: Reader | None = None
     decoded_s: float = float("-inf")
 
 
@@ -95,11 +94,17 @@ class NativeLink(RosConnection):
     reads_anew = False
     server_s = 2.0
 
-    def __init__(self, types: MessageTypes, patience: Patience) -> None:
+    def __init__(self, types: KnownTypes, patience: Patience) -> None:
         super().__init__(patience)
         self._types = types
+        self._found_s: float | None = None
         self._advertised: dict[str, tuple[str, Any]] = {}
         self._actions: dict[str, ActionWire] = {}
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when nodes have been there, in wall time; None while none is."""
+        return None if self._found_s is None else anyio.current_time() - self._found_s
 
     # --- implemented by each link
 
@@ -116,20 +121,12 @@ class NativeLink(RosConnection):
         """Return a quality of service."""
 
     @abstractmethod
-    def _read(self, topic: str, type_name: str, quality: Any, decode: Decode, take: Take) -> Any:  # noqa: ANN401
+    def _read(self, topic: str, type_name: str, quality: Any, decode: Decode, take: Take) -> Reader:  # noqa: ANN401
         """Begin to read; `decode` is called in another thread, `take` in the event loop."""
-
-    @abstractmethod
-    def _end_reading(self, reader: Any) -> None:  # noqa: ANN401 - the link's own
-        """Read no longer."""
 
     @abstractmethod
     def _write_to(self, topic: str, type_name: str, quality: Any) -> Writer:  # noqa: ANN401
         """Begin to write."""
-
-    @abstractmethod
-    def _end_writing(self, writer: Any) -> None:  # noqa: ANN401 - the link's own
-        """Write no longer."""
 
     @abstractmethod
     def _learn(self, subscription: Subscription) -> None:
@@ -184,9 +181,9 @@ class NativeLink(RosConnection):
         reading.reader = self._read(topic, type_name, quality, decode, take)
 
     def _end(self, subscription: Subscription) -> None:
-        if subscription.reader is not None:
-            self._end_reading(subscription.reader.reader)
-        subscription.reader = None
+        reading, subscription.reader = subscription.reader, None
+        if reading is not None and reading.reader is not None:
+            reading.reader.close()
 
     def _decode(
         self, reading: Reading, throttle_s: float, type_name: str, data: bytes
@@ -217,7 +214,7 @@ class NativeLink(RosConnection):
 
     def _take_back(self, topic: str) -> None:
         if topic in self._advertised:
-            self._end_writing(self._advertised.pop(topic)[1])
+            self._advertised.pop(topic)[1].close()
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish once the known subscribers are connected."""

@@ -93,7 +93,6 @@ class DdsConnection(NativeLink):
         self._services: dict[str, DdsService] = {}
         self._learned = WeakSet[Subscription]()
         """Those of whose type the robot was asked already."""
-        self._found_s: float | None = None
 
     @property
     def link(self) -> LinkName:
@@ -105,11 +104,6 @@ class DdsConnection(NativeLink):
     def is_open(self) -> bool:
         """True while a node of ROS is there."""
         return not self.discovery.is_empty
-
-    @property
-    def connected_for_s(self) -> float | None:
-        """Since when nodes have been there, in wall time; None while none is."""
-        return None if self._found_s is None else anyio.current_time() - self._found_s
 
     @property
     def distro(self) -> str:
@@ -178,14 +172,8 @@ class DdsConnection(NativeLink):
             dds_topic(topic), type_name, quality=quality, decode=decode, take=take
         )
 
-    def _end_reading(self, reader: RawReader) -> None:
-        self._participant.end_reading(reader)
-
     def _write_to(self, topic: str, type_name: str, quality: Quality) -> RawWriter:
         return self._participant.write_to(dds_topic(topic), type_name, quality=quality)
-
-    def _end_writing(self, writer: RawWriter) -> None:
-        self._participant.end_writing(writer)
 
     # --- types
 

@@ -1,5 +1,6 @@
 """The names of ROS in DDS, and the discovery data of DataWriters and DataReaders."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -118,9 +119,22 @@ class Quality:
 
 
 class RawReader:
-    """A reader of one topic. Both functions are given with it: one decodes, one takes."""
+    """A reader of one topic.
 
-    def __init__(self, reader: DataReader[Any], decode: Decode, take: Take) -> None:
+    Args:
+        decode: Decodes a message.
+        take: Takes what was decoded.
+        end: Takes it from those that are listened to, and lets go of it.
+    """
+
+    def __init__(
+        self,
+        reader: DataReader[Any],
+        decode: Decode,
+        take: Take,
+        end: Callable[["RawReader"], None],
+    ) -> None:
+        self._end = end
         self._reader: DataReader[Any] | None = reader
         self.condition = ReadCondition(reader, NOT_READ)
         self.decode = decode
@@ -143,6 +157,10 @@ class RawReader:
         return understand(sample.data, self.decode, source_s=info.source_timestamp / 1e9)
 
     def close(self) -> None:
+        """Read no longer."""
+        self._end(self)
+
+    def let_go(self) -> None:
         """Let go of DDS's reader."""
         del self.condition
         self._reader = None
@@ -164,7 +182,13 @@ class EndpointReader(RawReader):
 class RawWriter:
     """A writer of one topic."""
 
-    def __init__(self, writer: DataWriter[Any], raw_type: type[RawMessage]) -> None:
+    def __init__(
+        self,
+        writer: DataWriter[Any],
+        raw_type: type[RawMessage],
+        end: Callable[["RawWriter"], None],
+    ) -> None:
+        self._end = end
         self.writer: DataWriter[Any] | None = writer
         self._raw_type = raw_type
         self.n_matched = 0
@@ -180,6 +204,10 @@ class RawWriter:
             raise LinkError(
                 f"DDS did not send a message: {error}", hint="Try again; the network may be full."
             ) from error
+
+    def close(self) -> None:
+        """Write no longer."""
+        self._end(self)
 
     def note_matched(self, n_matched: int) -> None:
         """Take in how many readers there are."""

@@ -127,7 +127,7 @@ class DdsParticipant:
             (BuiltinTopicDcpsSubscription, take_reader),
         ):
             reader = BuiltinDataReader(self._participant, topic)
-            self._keep(EndpointReader(reader, lambda data: data, take))
+            self._keep(EndpointReader(reader, bytes, take, self._end_reading))
 
     def read(
         self, topic: str, type_name: str, *, quality: Quality, decode: Decode, take: Take
@@ -143,9 +143,8 @@ class DdsParticipant:
         """
         try:
             known, _ = self._topic(topic, type_name)
-            return self._keep(
-                RawReader(DataReader(self._participant, known, quality.qos), decode, take)
-            )
+            reader = DataReader(self._participant, known, quality.qos)
+            return self._keep(RawReader(reader, decode, take, self._end_reading))
         except DDSException as error:
             raise _unusable(topic, type_name, error) from error
 
@@ -156,23 +155,21 @@ class DdsParticipant:
             writer = DataWriter(self._publisher, known, quality.writers_qos)
         except DDSException as error:
             raise _unusable(topic, type_name, error) from error
-        raw_writer = RawWriter(writer, raw_type)
+        raw_writer = RawWriter(writer, raw_type, self._end_writing)
         with self._lock:
             self._raw_writers.append(raw_writer)
             writer.set_status_mask(DDSStatus.PublicationMatched)
             self._waitset.attach(writer)
         return raw_writer
 
-    def end_reading(self, raw_reader: RawReader) -> None:
-        """Read a topic no longer."""
+    def _end_reading(self, raw_reader: RawReader) -> None:
         with self._lock:
             if raw_reader in self._raw_readers:
                 self._raw_readers.remove(raw_reader)
                 self._waitset.detach(raw_reader.condition)
-                raw_reader.close()
+                raw_reader.let_go()
 
-    def end_writing(self, raw_writer: RawWriter) -> None:
-        """Write on a topic no longer."""
+    def _end_writing(self, raw_writer: RawWriter) -> None:
         with self._lock:
             if raw_writer in self._raw_writers and raw_writer.writer is not None:
                 self._raw_writers.remove(raw_writer)
@@ -240,7 +237,7 @@ class DdsParticipant:
     def _leave(self) -> None:
         with self._lock:
             for raw_reader in self._raw_readers:
-                raw_reader.close()
+                raw_reader.let_go()
             for raw_writer in self._raw_writers:
                 raw_writer.writer = None
             self._raw_readers, self._raw_writers = [], []

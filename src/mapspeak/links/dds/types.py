@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.cdr import Codec
+from mapspeak.links.cdr import KnownTypes
 from mapspeak.ros.definitions.texts import DISTROS, action_parts, find_parts, known_definitions
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import hash_type
@@ -87,7 +87,7 @@ def _type_of(described: Message) -> str:
 HUMBLE = "humble"
 
 
-class Types:
+class Types(KnownTypes):
     """Encodes and decodes, after the definitions known so far.
 
     Args:
@@ -99,18 +99,13 @@ class Types:
         self._distro = distro
         self._hashes: dict[str, str] = {}
         self._other_versions: set[str] = set()
-        self._book = build_type_book(distro)
-        self._codec = Codec(self._book)
+        super().__init__(build_type_book(distro))
 
     def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
         """Return the bytes of a message."""
         if self._is_other_version(type_name):
             raise self.refusal(type_name)
-        return self._codec.encode(type_name, message)
-
-    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
-        """Return the message in some bytes."""
-        return self._codec.decode(type_name, data)
+        return super().encode(type_name, message)
 
     def knows(self, type_name: str) -> bool:
         """Return True for a type whose fields, and those of all types within, are known."""
@@ -176,9 +171,6 @@ class Types:
     def definitions(self, type_name: str) -> dict[str, str]:
         """Return the texts of a type and of all within; see `RosConnection.fetch_definitions`."""
         return self._book.texts_of(find_parts(self._book.texts, type_name))
-
-    def _use(self, book: TypeBook) -> None:
-        self._book, self._codec = book, Codec(book, self._codec.store)
 
 
 def _has_hash(book: TypeBook, name: str, type_hash: str) -> bool:

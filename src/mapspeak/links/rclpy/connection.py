@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncGenerator, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
-from typing import Any, Protocol
+from typing import Any
 
 import anyio
 from anyio.abc import TaskGroup
@@ -20,7 +20,7 @@ from mapspeak.ros.activity import Subscription
 from mapspeak.ros.link import check_name, plain_errors
 from mapspeak.ros.messages.fields import bare_type
 from mapspeak.ros.patience import Patience
-from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
+from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""
@@ -58,7 +58,6 @@ class Ros2Connection(NativeLink):
         self.distro = distro
         self._participant = participant
         self._tasks = tasks
-        self._found_s: float | None = None
         self._services: dict[str, RclpyService] = {}
 
     @property
@@ -70,11 +69,6 @@ class Ros2Connection(NativeLink):
     def is_open(self) -> bool:
         """True, with or without subscribers to our topics."""
         return True
-
-    @property
-    def connected_for_s(self) -> float | None:
-        """Since when others have been found, in wall time; None before."""
-        return None if self._found_s is None else anyio.current_time() - self._found_s
 
     async def start(self) -> None:
         """Return when the participants have been found, or there are none."""
@@ -116,14 +110,8 @@ class Ros2Connection(NativeLink):
     ) -> RclpyReader:
         return RclpyReader(self._participant, topic, type_name, quality, decode, take)
 
-    def _end_reading(self, reader: RclpyReader) -> None:
-        reader.close()
-
     def _write_to(self, topic: str, type_name: str, quality: QoSProfile) -> RclpyWriter:
         return RclpyWriter(self._participant, topic, type_name, quality)
-
-    def _end_writing(self, writer: RclpyWriter) -> None:
-        writer.close()
 
     # --- types
 
@@ -175,11 +163,10 @@ class Ros2Connection(NativeLink):
         return float(self._participant.node.get_clock().now().nanoseconds) / NANOSECONDS
 
     async def fetch_nodes(self) -> tuple[str, ...]:
-        """Return the full names of all nodes but ours."""
-        return self.nodes()
-
-    def nodes(self) -> tuple[str, ...]:
         """Return the full names of all nodes but ours, as they are known now."""
+        return self._nodes()
+
+    def _nodes(self) -> tuple[str, ...]:
         found = self._participant.node.get_node_names_and_namespaces()
         names = {
             f"{namespace.rstrip('/')}/{name}"
@@ -192,7 +179,7 @@ class Ros2Connection(NativeLink):
         """Return the topics and services that a node publishes, subscribes to and serves."""
         namespace, _, name = node.rpartition("/")
         ours = self._participant.node
-        if node not in self.nodes():
+        if node not in self._nodes():
             raise unknown(node)
         asked = (
             ours.get_publisher_names_and_types_by_node,
@@ -263,7 +250,7 @@ class Ros2Connection(NativeLink):
 
     def _sees_others(self) -> bool:
         """Return True once a participant was found. Silent topics show later losses."""
-        if self._found_s is None and self.nodes():
+        if self._found_s is None and self._nodes():
             self._found_s = anyio.current_time()
         return self._found_s is not None
 
@@ -282,23 +269,7 @@ def _shown(found: Iterable[tuple[str, Any]]) -> tuple[str, ...]:
     return tuple(sorted(name for name, _ in found if not is_hidden(name)))
 
 
-class RclpyContext(Protocol):
-    """The queries to a system that is still being found."""
-
-    def nodes(self) -> tuple[str, ...]:
-        """Return the full names of all nodes that are known now."""
-        ...
-
-    async def fetch_node(self, node: str) -> NodeLinks:
-        """Return the topics and services of a node."""
-        ...
-
-    async def fetch_graph(self) -> RosGraph:
-        """Return the topics and actions there are."""
-        ...
-
-
-async def wait_until_quiet(system: RclpyContext) -> None:
+async def wait_until_quiet(system: RosConnection) -> None:
     """Return when nothing new comes, and every node has endpoints: these come after its name."""
     graph, before = await system.fetch_graph(), None
     while graph != before or not await _shows_all_nodes(system):
@@ -306,8 +277,8 @@ async def wait_until_quiet(system: RclpyContext) -> None:
         graph, before = await system.fetch_graph(), graph
 
 
-async def _shows_all_nodes(system: RclpyContext) -> bool:
-    for node in system.nodes():
+async def _shows_all_nodes(system: RosConnection) -> bool:
+    for node in await system.fetch_nodes():
         try:
             links = await system.fetch_node(node)
         except LinkError:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.cdr import Codec
+from mapspeak.links.cdr import Codec, KnownTypes
 from mapspeak.links.endpoints import ACTION_PART, whole_type
 from mapspeak.ros.definitions.texts import (
     ACTION_PARTS,
@@ -37,12 +37,11 @@ IN_ACTION = {
 """The attributes in which rclpy keeps the classes of an action's parts."""
 
 
-class RclpyTypes:
+class RclpyTypes(KnownTypes):
     """Encodes and decodes, after the definitions of the ROS on this machine."""
 
     def __init__(self) -> None:
-        self._book = TypeBook({})
-        self._codec = Codec(self._book)
+        super().__init__(TypeBook({}))
 
     def knows(self, type_name: str) -> bool:
         """Return True for a type that is installed here."""
@@ -71,10 +70,8 @@ class RclpyTypes:
         if kind == "action":
             texts |= action_parts(whole)
         _add_what_is_within(texts, tuple(texts))
-        book = TypeBook({**self._book.texts, **texts})
-        self._codec = codec = Codec(book, self._codec.store)
-        self._book = book
-        return codec
+        self._use(TypeBook({**self._book.texts, **texts}))
+        return self._codec
 
 
 def write_definition(message_class: Any) -> str:  # noqa: ANN401 - likewise
