@@ -26,8 +26,15 @@ from mapspeak.links.endpoints import (
 )
 from mapspeak.links.goals import ActionWire, ServiceClient
 from mapspeak.ros.activity import ActionGoal, Subscription
-from mapspeak.ros.link import check_name, wrong_type
-from mapspeak.ros.messages.fields import BULKY, TYPE, Dialect, Message, bare_type
+from mapspeak.ros.link import wrong_type
+from mapspeak.ros.messages.fields import (
+    BULKY,
+    Dialect,
+    Message,
+    bare_type,
+    check_name,
+    check_type,
+)
 from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import RosConnection, RosGraph
 
@@ -243,7 +250,7 @@ class NativeLink(RosConnection):
         return self._advertised[topic]
 
     def _check(self, topic: str, type_name: str | None) -> None:
-        check_name(topic)
+        check_name(topic, is_full=True)
         if type_name is None:
             return
         self._check_type(type_name)
@@ -254,10 +261,7 @@ class NativeLink(RosConnection):
 
     def _check_type(self, type_name: str) -> None:
         """Raise `LinkError` for an invalid type."""
-        if not TYPE.fullmatch(type_name):
-            raise LinkError(
-                f"{type_name[:80]!r} is no type.", hint='Types are written "package/msg/Type".'
-            )
+        check_type(type_name)
 
     # --- services and actions
 
@@ -283,7 +287,7 @@ class NativeLink(RosConnection):
         type_name: str | None = None,
         timeout_s: float,
     ) -> Sample:
-        check_name(service)
+        check_name(service, is_full=True)
         client = await self._service(service, within_s=min(self.server_s, timeout_s))
         if type_name is not None and bare_type(type_name) != bare_type(client.type_name):
             raise wrong_type(service, client.type_name, type_name)
@@ -291,7 +295,7 @@ class NativeLink(RosConnection):
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action and return the goal, updated as its state changes."""
-        check_name(action)
+        check_name(action, is_full=True)
         found = self._action_types().get(action)
         if found not in (None, bare_type(type_name)):
             raise wrong_type(action, str(found), type_name)

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages.fields import NAME, bare_type
+from mapspeak.ros.messages.fields import bare_type
 
 NOTICE_S = 0.3
 """From a topic's first announcement until the robot's nodes listen, in wall time."""
@@ -90,12 +90,6 @@ async def say_again(say: Callable[[], object]) -> None:
         await anyio.sleep(PAUSE_S)
         with suppress(LinkError):
             say()
-
-
-def check_name(name: str) -> None:
-    """Do nothing for the full name of a topic, a service or an action."""
-    if not (name.startswith("/") and NAME.fullmatch(name)):
-        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
 
 
 def wrong_type(name: str, found: str, given: str) -> LinkError:

@@ -20,12 +20,9 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     Conversation,
     Encoding,
     Event,
+    EventKind,
     FrameRefused,
-    GoalEnded,
-    GoalFedBack,
-    Published,
-    ServiceAnswered,
-    StatusNoted,
+    Told,
     write_operation,
 )
 from mapspeak.ros.port import new_id
@@ -35,9 +32,13 @@ def frame(operation: dict[str, Any]) -> bytes:
     return orjson.dumps(operation)
 
 
-def published(event: Event | None) -> Published:
-    assert isinstance(event, Published)
+def told(event: Event | None, kind: EventKind) -> Told:
+    assert isinstance(event, Told)
+    assert event.kind is kind
     return event
+
+
+published = partial(told, kind=EventKind.PUBLISHED)
 
 
 def refused(event: Event | None) -> FrameFault:
@@ -66,24 +67,24 @@ HELLO = {"op": "publish", "topic": "/greeting", "msg": {"data": "hello"}}
 
 def test_a_publication_says_its_topic_and_its_message() -> None:
     event = published(Conversation().receive(frame(HELLO), is_text=True))
-    assert event.topic == "/greeting"
-    assert event.message == {"data": "hello"}
+    assert event.key == "/greeting"
+    assert event.values == {"data": "hello"}
 
 
 def test_slashes_may_be_escaped() -> None:
     text = rb'{"op": "publish", "topic": "\/map", "msg": {}}'
-    assert published(Conversation().receive(text, is_text=True)).topic == "/map"
+    assert published(Conversation().receive(text, is_text=True)).key == "/map"
 
 
 def test_answers_carry_the_id_of_their_call() -> None:
     conversation = Conversation()
     good = {"op": "service_response", "id": "b", "values": {"sum": 3}, "result": True}
     bad = {"op": "service_response", "id": "a", "values": "no such service", "result": False}
-    assert conversation.receive(frame(good), is_text=True) == ServiceAnswered(
-        call_id="b", is_success=True, values={"sum": 3}
+    assert conversation.receive(frame(good), is_text=True) == Told(
+        kind=EventKind.ANSWERED, key="b", values={"sum": 3}
     )
-    assert conversation.receive(frame(bad), is_text=True) == ServiceAnswered(
-        call_id="a", is_success=False, values="no such service"
+    assert conversation.receive(frame(bad), is_text=True) == Told(
+        kind=EventKind.ANSWERED, key="a", is_result=False, values="no such service"
     )
 
 
@@ -95,8 +96,8 @@ def test_only_the_status_of_an_action_says_how_it_ended() -> None:
         "result": True,
         "values": {"error_code": 0},
     }
-    assert Conversation().receive(frame(aborted), is_text=True) == GoalEnded(
-        goal_id="goal", status=6, is_result=True, values={"error_code": 0}
+    assert Conversation().receive(frame(aborted), is_text=True) == Told(
+        kind=EventKind.ENDED, key="goal", status=6, values={"error_code": 0}
     )
 
 
@@ -104,18 +105,18 @@ def test_feedback_and_remarks_are_told_apart() -> None:
     conversation = Conversation()
     feedback = {"op": "action_feedback", "id": "g", "values": {"distance_remaining": 1.5}}
     remark = {"op": "status", "level": "error", "msg": "no", "id": "x"}
-    assert conversation.receive(frame(feedback), is_text=True) == GoalFedBack(
-        goal_id="g", values={"distance_remaining": 1.5}
+    assert conversation.receive(frame(feedback), is_text=True) == Told(
+        kind=EventKind.FED_BACK, key="g", values={"distance_remaining": 1.5}
     )
-    assert conversation.receive(frame(remark), is_text=True) == StatusNoted(
-        level="error", text="no"
+    assert conversation.receive(frame(remark), is_text=True) == Told(
+        kind=EventKind.NOTED, key="error", values="no"
     )
 
 
 @pytest.mark.parametrize("spelling", ["NaN", "nan", "-nan"])
 def test_not_a_number_is_read_however_it_is_spelled(spelling: str) -> None:
     text = f'{{"op": "publish", "topic": "/scan", "msg": {{"r": [1.0, {spelling}]}}}}'
-    ranges = published(Conversation().receive(text.encode(), is_text=True)).message["r"]
+    ranges = published(Conversation().receive(text.encode(), is_text=True)).values["r"]
     assert ranges[0] == 1.0
     assert math.isnan(ranges[1])
 
@@ -123,7 +124,7 @@ def test_not_a_number_is_read_however_it_is_spelled(spelling: str) -> None:
 @pytest.mark.parametrize("spelling", ["Infinity", "inf", "-Infinity", "-inf", "Inf", "+inf"])
 def test_infinity_is_read_however_it_is_spelled(spelling: str) -> None:
     text = f'{{"op": "publish", "topic": "/scan", "msg": {{"r": {spelling}, "w": "inf, NaN"}}}}'
-    message = published(Conversation().receive(text.encode(), is_text=True)).message
+    message = published(Conversation().receive(text.encode(), is_text=True)).values
     assert message == {"r": float(spelling), "w": "inf, NaN"}
 
 
@@ -136,7 +137,7 @@ def test_cbor_typed_arrays_become_numpy_arrays(tag: int, dtype: str) -> None:
     event = Conversation().receive(
         cbor2.dumps({"op": "publish", "topic": "/map", "msg": message}), is_text=False
     )
-    data = published(event).message["data"]
+    data = published(event).values["data"]
     assert data.dtype == np.dtype(dtype)
     assert data.tolist() == [0, 1, 100]
 
@@ -146,7 +147,7 @@ def test_a_cbor_array_of_bytes_becomes_bytes() -> None:
     event = Conversation().receive(
         cbor2.dumps({"op": "publish", "topic": "/camera", "msg": message}), is_text=False
     )
-    assert published(event).message == {"data": b"jpeg"}
+    assert published(event).values == {"data": b"jpeg"}
 
 
 @pytest.mark.parametrize("tag", [2, 28, 35, 258])
@@ -160,9 +161,9 @@ def test_a_long_list_of_whole_numbers_arrives_as_an_array() -> None:
     message = {"info": {"width": 3}, "data": cells}
     text = frame({"op": "publish", "topic": "/map", "msg": message})
     event = published(Conversation().receive(text, is_text=True))
-    assert isinstance(event.message["data"], np.ndarray)
-    assert event.message["data"].tolist() == cells
-    assert event.message["info"] == {"width": 3}
+    assert isinstance(event.values["data"], np.ndarray)
+    assert event.values["data"].tolist() == cells
+    assert event.values["info"] == {"width": 3}
 
 
 @pytest.mark.parametrize("spoilt", ["1,,2", "1 2", "--1", "1,", "-", "-,1"])
@@ -173,20 +174,19 @@ def test_a_long_list_with_a_fault_in_it_is_no_message(spoilt: str) -> None:
 
 
 def test_long_lists_find_their_places_wherever_they_stand() -> None:
-    told = {"first": {"data": [1] * 30_000}, "all": [[0.5] * 9_000, [300] * 9_000], "data": [2]}
-    text = frame({"op": "service_response", "id": "1", "values": told})
-    event = Conversation().receive(text, is_text=True)
-    assert isinstance(event, ServiceAnswered)
+    values = {"first": {"data": [1] * 30_000}, "all": [[0.5] * 9_000, [300] * 9_000], "data": [2]}
+    text = frame({"op": "service_response", "id": "1", "values": values})
+    event = told(Conversation().receive(text, is_text=True), EventKind.ANSWERED)
     assert event.values["data"] == [2]
     assert event.values["first"]["data"].tolist() == [1] * 30_000
-    assert [each.tolist() for each in event.values["all"]] == told["all"]
+    assert [each.tolist() for each in event.values["all"]] == values["all"]
     assert event.values["first"]["data"].nbytes == 30_000
 
 
 def test_a_long_list_may_hold_what_is_no_number() -> None:
     ranges = "Infinity, 1.5, NaN, -Infinity, " * 10_000 + "2e3"
     text = f'{{"op": "publish", "topic": "/scan", "msg": {{"ranges": [{ranges}]}}}}'
-    read = published(Conversation().receive(text.encode(), is_text=True)).message["ranges"]
+    read = published(Conversation().receive(text.encode(), is_text=True)).values["ranges"]
     assert read[[0, 1, 3, -1]].tolist() == [math.inf, 1.5, -math.inf, 2000.0]
     assert math.isnan(read[2])
 
@@ -194,7 +194,7 @@ def test_a_long_list_may_hold_what_is_no_number() -> None:
 def test_a_long_list_within_a_text_stays_there() -> None:
     said = f"[{'1,' * 20_000}1]"
     text = frame({"op": "publish", "topic": "/log", "msg": {"said": said, "list": [1] * 20_000}})
-    assert published(Conversation().receive(text, is_text=True)).message["said"] == said
+    assert published(Conversation().receive(text, is_text=True)).values["said"] == said
 
 
 def test_pieces_are_put_together_in_any_order_with_a_fraction_for_a_total() -> None:
@@ -205,7 +205,7 @@ def test_pieces_are_put_together_in_any_order_with_a_fraction_for_a_total() -> N
         conversation.receive(piece, is_text=True) for piece in [*reversed(pieces[1:]), pieces[0]]
     ]
     assert events[:-1] == [None] * 4
-    assert published(events[-1]).message == {"data": "hello"}
+    assert published(events[-1]).values == {"data": "hello"}
     assert conversation.n_bytes_held == 0
 
 
@@ -214,7 +214,7 @@ def test_a_piece_that_comes_twice_changes_nothing() -> None:
     first, second = pieces_of(json.dumps(HELLO), 2)
     assert conversation.receive(first, is_text=True) is None
     assert conversation.receive(first, is_text=True) is None
-    assert published(conversation.receive(second, is_text=True)).topic == "/greeting"
+    assert published(conversation.receive(second, is_text=True)).key == "/greeting"
 
 
 def test_a_message_cut_short_does_not_spoil_the_next_with_the_same_id() -> None:
@@ -223,7 +223,7 @@ def test_a_message_cut_short_does_not_spoil_the_next_with_the_same_id() -> None:
     events = [
         conversation.receive(piece, is_text=True) for piece in pieces_of(json.dumps(HELLO), 2)
     ]
-    assert published(events[-1]).topic == "/greeting"
+    assert published(events[-1]).key == "/greeting"
 
 
 def test_pieces_that_are_never_complete_do_not_fill_the_memory() -> None:
@@ -312,9 +312,9 @@ def test_a_large_path_is_read_in_json_and_in_cbor() -> None:
     point = {"position": {"x": 1.5, "y": 2.5, "z": 0.0}, "orientation": {"w": 1.0}}
     poses = [{"header": {"frame_id": "map"}, "pose": point}] * 10_000
     path = {"op": "publish", "topic": "/plan", "msg": {"poses": poses}}
-    assert published(Conversation().receive(frame(path), is_text=True)).message == {"poses": poses}
+    assert published(Conversation().receive(frame(path), is_text=True)).values == {"poses": poses}
     event = Conversation().receive(cbor2.dumps(path), is_text=False)
-    assert published(event).message == {"poses": poses}
+    assert published(event).values == {"poses": poses}
 
 
 @pytest.mark.parametrize("tail", [b'\\"' * 100_000, b"nan " * 100_000, b'"nan' * 100_000])

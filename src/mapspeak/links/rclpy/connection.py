@@ -17,8 +17,8 @@ from mapspeak.links.rclpy.endpoints import RclpyReader, RclpyService, RclpyWrite
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.link import check_name, plain_errors
-from mapspeak.ros.messages.fields import bare_type
+from mapspeak.ros.link import plain_errors
+from mapspeak.ros.messages.fields import bare_type, check_name
 from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection
 
@@ -196,12 +196,12 @@ class Ros2Connection(NativeLink):
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish on a topic."""
-        check_name(topic)
+        check_name(topic, is_full=True)
         return self._nodes_of(self._participant.node.get_publishers_info_by_topic(topic))
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that listen to a topic."""
-        check_name(topic)
+        check_name(topic, is_full=True)
         return self._nodes_of(self._participant.node.get_subscriptions_info_by_topic(topic))
 
     def _topic_types(self) -> dict[str, str]:

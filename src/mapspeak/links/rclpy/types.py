@@ -21,7 +21,7 @@ from mapspeak.ros.definitions.texts import (
 )
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import NOTHING
-from mapspeak.ros.messages.fields import TYPE, bare_type
+from mapspeak.ros.messages.fields import TYPE, bare_type, check_type
 
 FIELD = re.compile(
     r"sequence<(?P<any>.+?)(?:, (?P<most>\d+))?>|(?P<each>[^\[\]]+)\[(?P<length>\d+)\]|(?P<one>.+)"
@@ -120,8 +120,7 @@ def find_message(type_name: str, kind: str = "msg") -> RosClass:
     found = find_class(type_name, kind)
     if found is not None:
         return found
-    if not TYPE.fullmatch(type_name):
-        raise LinkError(f"{type_name[:80]!r} is no type.", hint=f'Such as "package/{kind}/Type".')
+    check_type(type_name)
     bare = bare_type(type_name)
     package = bare.partition("/")[0].replace("_", "-")[:60]
     raise LinkError(

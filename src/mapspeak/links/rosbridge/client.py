@@ -16,11 +16,8 @@ from mapspeak.links.rosbridge.protocol.codec import require_cbor
 from mapspeak.links.rosbridge.protocol.conversation import (
     Encoding,
     Event,
+    EventKind,
     FrameRefused,
-    GoalEnded,
-    GoalFedBack,
-    Published,
-    StatusNoted,
     write_operation,
 )
 from mapspeak.links.rosbridge.rosapi import Rosapi
@@ -289,27 +286,19 @@ class RosbridgeClient(Rosapi):
         channel.end_standing(operation_id, text)
 
     def _take(self, event: Event) -> None:
-        match event:
-            case Published():
-                subscription = self._subscriptions.get(event.topic)
-                if subscription is not None:
-                    subscription.take(event.message)
-            case GoalFedBack():
-                known = self._goals.get(event.goal_id)
-                if known is not None:
-                    known[0].take_feedback(event.values)
-            case GoalEnded():
-                known = self._goals.pop(event.goal_id, None)
-                if known is not None:
-                    known[0].take_end(
-                        ActionEnd(
-                            status=event.status, is_result=event.is_result, values=event.values
-                        )
-                    )
-            case StatusNoted():
-                logger.info("rosbridge notes: %s: %s", event.level, event.text)
-            case FrameRefused():
-                self.n_frames_refused += 1
+        if isinstance(event, FrameRefused):
+            self.n_frames_refused += 1
+        elif event.kind is EventKind.PUBLISHED and event.key in self._subscriptions:
+            self._subscriptions[event.key].take(event.values)
+        elif event.kind is EventKind.FED_BACK and event.key in self._goals:
+            self._goals[event.key][0].take_feedback(event.values)
+        elif event.kind is EventKind.ENDED and event.key in self._goals:
+            goal, _ = self._goals.pop(event.key)
+            goal.take_end(
+                ActionEnd(status=event.status, is_result=event.is_result, values=event.values)
+            )
+        elif event.kind is EventKind.NOTED:
+            logger.info("rosbridge notes: %s: %s", event.key[:40], str(event.values)[:200])
 
     def _lose_goals(self, channel: Channel) -> None:
         # rosbridge itself may have restarted, and forgotten the goals that were given up.

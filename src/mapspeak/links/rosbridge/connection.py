@@ -14,8 +14,9 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     LIGHT_BYTES,
     Conversation,
     Event,
+    EventKind,
     FrameRefused,
-    ServiceAnswered,
+    Told,
 )
 from mapspeak.links.rosbridge.websocket import Received, SocketClosed, WebSocket
 from mapspeak.ros.patience import Patience
@@ -43,7 +44,7 @@ class SocketConnection:
         self._conversation = Conversation()
         self._unsent, self._to_send = anyio.create_memory_object_stream[bytes](MAX_UNSENT)
         self._pending: dict[str, anyio.Event] = {}
-        self._answers: dict[str, ServiceAnswered] = {}
+        self._answers: dict[str, Told] = {}
         self._may_go = anyio.Event()
         self._is_sent = anyio.Event()
         self.is_over = anyio.Event()
@@ -70,7 +71,7 @@ class SocketConnection:
                 hint="Its network may be overloaded or gone: check the connection and try again.",
             ) from None
 
-    async def ask(self, text: bytes, *, call_id: str) -> ServiceAnswered | None:
+    async def ask(self, text: bytes, *, call_id: str) -> Told | None:
         """Return the answer to a call; None when the socket died first."""
         is_over = self._pending[call_id] = anyio.Event()
         try:
@@ -132,7 +133,7 @@ class SocketConnection:
         while True:
             event = await self._understand(await self._socket.receive())
             self._judge(event)
-            if isinstance(event, ServiceAnswered):
+            if isinstance(event, Told) and event.kind is EventKind.ANSWERED:
                 self._answer(event)
             elif event is not None:
                 self._tell(event)
@@ -175,12 +176,12 @@ class SocketConnection:
             # A fault of ours; one odd message must not cost the robot its connection.
             logger.exception("What the robot said could not be taken in")
 
-    def _answer(self, answer: ServiceAnswered) -> None:
+    def _answer(self, answer: Told) -> None:
         self.n_answers += 1
         # An answer that comes after its caller has gone is of no use to anybody.
-        if answer.call_id in self._pending:
-            self._answers[answer.call_id] = answer
-            self._pending[answer.call_id].set()
+        if answer.key in self._pending:
+            self._answers[answer.key] = answer
+            self._pending[answer.key].set()
 
     async def _listen_for_life(self) -> None:
         n_bytes, heard_s = 0, anyio.current_time()

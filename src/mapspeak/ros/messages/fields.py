@@ -124,6 +124,34 @@ def _field(message: object, name: str) -> Any:  # noqa: ANN401 - ROS JSON enters
 NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
 TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 """Patterns of names of ROS, and of its types."""
+
+
+def check_name(name: str, *, is_full: bool = False) -> None:
+    """Do nothing for the name of a topic, a service or an action; a full one begins with a slash.
+
+    Raises:
+        LinkError: It is none.
+    """
+    if NAME.fullmatch(name) is None or (is_full and not name.startswith("/")):
+        raise LinkError(
+            f"{name[:80]!r} is not the name of a ROS topic, service or action.",
+            hint="It looks like /camera/image_raw: letters, digits, _ and /.",
+        )
+
+
+def check_type(name: str) -> None:
+    """Do nothing for the name of a type.
+
+    Raises:
+        LinkError: It is none.
+    """
+    if TYPE.fullmatch(name) is None:
+        raise LinkError(
+            f"{name[:80]!r} is not the name of a ROS type.",
+            hint="It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist (ROS 1).",
+        )
+
+
 NANOSECONDS = 1_000_000_000
 LARGEST_SECONDS = 2**32 - 1
 

@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -21,7 +21,7 @@ from mapspeak.links.rosbridge.protocol.bounds import (
     Raw,
 )
 from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json
-from mapspeak.ros.messages.fields import NAME, TYPE, Message
+from mapspeak.ros.messages.fields import check_name, check_type
 
 MAX_DETAIL_LENGTH = 200
 LIGHT_BYTES = 32_768
@@ -29,66 +29,35 @@ LIGHT_BYTES = 32_768
 SIGNS_OF_MORE = (b"fragment", b"\\u")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Published:
-    """A message on a topic.
+class EventKind(StrEnum):
+    """What a server tells, by the name of the operation."""
 
-    Attributes:
-        message: Its fields; may hold numpy arrays.
-    """
-
-    topic: str
-    message: Message
+    PUBLISHED = "publish"
+    ANSWERED = "service_response"
+    FED_BACK = "action_feedback"
+    ENDED = "action_result"
+    NOTED = "status"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ServiceAnswered:
-    """The answer to one call.
+class Told:
+    """One operation of the server.
 
     Attributes:
-        is_success: The service was there and did not fail.
-        values: Its response; a text with the reason where it failed.
+        key: The topic of a message, the id of a call or a goal, the level of a remark.
+        values: The message, the response or the result, which may hold numpy arrays; a text with
+            the reason where a call failed or a goal was refused.
+        is_result: False for a call that failed and a goal that was refused; says nothing about a
+            goal's success.
+        status: Of a goal that ended, as in action_msgs/GoalStatus: 4 succeeded, 5 cancelled,
+            6 aborted; None if unsaid.
     """
 
-    call_id: str
-    is_success: bool
+    kind: EventKind
+    key: str
     values: Any
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GoalFedBack:
-    """Feedback of an action."""
-
-    goal_id: str
-    values: Message
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GoalEnded:
-    """The end of an action.
-
-    Attributes:
-        status: As in action_msgs/GoalStatus: 4 succeeded, 5 cancelled, 6 aborted; None if unsaid.
-        is_result: False when the goal was refused; says nothing about success.
-        values: The result message; a text with the reason where it was refused.
-    """
-
-    goal_id: str
-    status: int | None
-    is_result: bool
-    values: Any
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StatusNoted:
-    """A remark of the server.
-
-    Attributes:
-        level: "error", "warning", "info" or "none".
-    """
-
-    level: str
-    text: str
+    is_result: bool = True
+    status: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +68,7 @@ class FrameRefused:
     detail: str
 
 
-Event = Published | ServiceAnswered | GoalFedBack | GoalEnded | StatusNoted | FrameRefused
+Event = Told | FrameRefused
 
 
 class Conversation:
@@ -147,65 +116,32 @@ class Conversation:
             if whole is None:
                 return None
             return self._understand(self._checked(whole, decode_json), is_whole=True)
-        if not isinstance(name, str) or name not in _READERS:
+        if name not in list(EventKind):
             raise FrameError(FrameFault.UNKNOWN_OPERATION, str(name)[:40])
-        return _READERS[name](operation)
+        return _read(EventKind(name), operation)
 
 
-def _published(operation: dict[str, Any]) -> Published:
-    message = operation.get("msg")
-    if not isinstance(message, dict):
-        raise FrameError(FrameFault.MISSING_FIELD, "msg")
-    return Published(topic=_text(operation, "topic"), message=message)
+_VALUES = {EventKind.PUBLISHED: "msg", EventKind.NOTED: "msg"}
+_KEYS = {EventKind.PUBLISHED: "topic", EventKind.NOTED: "level"}
 
 
-def _service_answered(operation: dict[str, Any]) -> ServiceAnswered:
-    return ServiceAnswered(
-        call_id=_text(operation, "id"),
-        # Old servers leave this out; they answered only successful calls.
-        is_success=operation.get("result", True) is True,
-        values=operation.get("values", {}),
-    )
-
-
-def _goal_fed_back(operation: dict[str, Any]) -> GoalFedBack:
-    values = operation.get("values")
-    if not isinstance(values, dict):
-        raise FrameError(FrameFault.MISSING_FIELD, "values")
-    return GoalFedBack(goal_id=_text(operation, "id"), values=values)
-
-
-def _goal_ended(operation: dict[str, Any]) -> GoalEnded:
+def _read(kind: EventKind, operation: dict[str, Any]) -> Told:
+    key = operation.get(name := _KEYS.get(kind, "id"))
+    if not isinstance(key, str):
+        raise FrameError(FrameFault.MISSING_FIELD, name)
+    values = operation.get(name := _VALUES.get(kind, "values"), {})
+    is_message = kind in (EventKind.PUBLISHED, EventKind.FED_BACK)
+    if is_message and not isinstance(operation.get(name), dict):
+        raise FrameError(FrameFault.MISSING_FIELD, name)
     status = operation.get("status")
-    return GoalEnded(
-        goal_id=_text(operation, "id"),
-        status=status if isinstance(status, int) and not isinstance(status, bool) else None,
+    return Told(
+        kind=kind,
+        key=key,
+        values=values,
+        # Old servers leave this out; they answered only successful calls.
         is_result=operation.get("result", True) is True,
-        values=operation.get("values", {}),
+        status=status if isinstance(status, int) and not isinstance(status, bool) else None,
     )
-
-
-def _status_noted(operation: dict[str, Any]) -> StatusNoted:
-    return StatusNoted(
-        level=str(operation.get("level"))[:40],
-        text=str(operation.get("msg"))[:MAX_DETAIL_LENGTH],
-    )
-
-
-_READERS: dict[str, Callable[[dict[str, Any]], Event]] = {
-    "publish": _published,
-    "service_response": _service_answered,
-    "action_feedback": _goal_fed_back,
-    "action_result": _goal_ended,
-    "status": _status_noted,
-}
-
-
-def _text(operation: dict[str, Any], key: str) -> str:
-    value = operation.get(key)
-    if not isinstance(value, str):
-        raise FrameError(FrameFault.MISSING_FIELD, key)
-    return value
 
 
 MAX_NESTING = 32
@@ -225,12 +161,10 @@ def write_operation(operation: str, **fields: Any) -> bytes:  # noqa: ANN401 - R
         LinkError: A name or type is invalid, or a number is not finite: a robot would act on it.
     """
     said = {key: value for key, value in fields.items() if value is not None}
-    for key in ("topic", "service", "action"):
-        if key in said:
-            _check_name(said[key])
-    for key in ("type", "action_type"):
-        if key in said:
-            _check_type(said[key])
+    for key in said.keys() & {"topic", "service", "action"}:
+        check_name(said[key])
+    for key in said.keys() & {"type", "action_type"}:
+        check_type(said[key])
     _check_numbers(said, depth=0)
     try:
         return orjson.dumps({"op": operation, **said}, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -263,19 +197,3 @@ def _not_finite(shown: object) -> LinkError:
     return LinkError(
         f"A message for the robot holds {shown}.", hint="Give finite numbers: it would act on them."
     )
-
-
-def _check_type(type_name: str) -> None:
-    if TYPE.fullmatch(type_name) is None:
-        raise LinkError(
-            f"{type_name[:80]!r} is not the name of a ROS type.",
-            hint="It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist (ROS 1).",
-        )
-
-
-def _check_name(name: str) -> None:
-    if NAME.fullmatch(name) is None:
-        raise LinkError(
-            f"{name[:80]!r} is not the name of a ROS topic, service or action.",
-            hint="It looks like /camera/image_raw: letters, digits, _ and /.",
-        )
