@@ -97,8 +97,9 @@ class Codec:
     def encode(self, type_name: str, message: Message) -> bytes:
         """Return the bytes of a message with their header; fields left out hold their defaults."""
         layout = self._find(type_name)
-        filled = self._fill(layout, check_message(self._book, type_name, message))
-        return bytes(self.store.serialize_cdr(filled, layout.name, little_endian=True))
+        filled = self._book.fill(type_name, check_message(self._book, type_name, message))
+        shaped = self._shape(layout, filled)
+        return bytes(self.store.serialize_cdr(shaped, layout.name, little_endian=True))
 
     def _find(self, type_name: str, above: tuple[str, ...] = ()) -> _Layout:
         """Return the layout of a type; the store is told of it where it does not know it yet."""
@@ -109,27 +110,18 @@ class Codec:
             self._layouts[type_name] = self.store.lay_out(message, inner)
         return self._layouts[type_name]
 
-    def _fill(self, layout: _Layout, message: Mapping[str, Any]) -> SimpleNamespace:
-        """Return a checked message as rosbags wants it, with all its fields."""
-        values = [
-            self._fill_field(layout, field, message[field.name])
-            if field.name in message
-            else self._fill_field(layout, field, self._default(field))
-            for field in layout.fields or (NOTHING,)
-        ]
-        return SimpleNamespace(**{_numbered(number): value for number, value in enumerate(values)})
+    def _shape(self, layout: _Layout, message: Mapping[str, Any]) -> SimpleNamespace:
+        """Return a message with all its fields as rosbags wants it."""
+        values = [self._shape_field(layout, field, message[field.name]) for field in layout.fields]
+        numbered = enumerate(values or [0])
+        return SimpleNamespace(**{_numbered(number): value for number, value in numbered})
 
-    def _default(self, field: Field) -> Any:  # noqa: ANN401 - ROS JSON
-        if field.is_message:
-            return {} if field.length is None else [{}] * field.length
-        return self._book.default(field)
-
-    def _fill_field(self, layout: _Layout, field: Field, value: Any) -> Any:  # noqa: ANN401 - ROS JSON
+    def _shape_field(self, layout: _Layout, field: Field, value: Any) -> Any:  # noqa: ANN401 - ROS JSON
         if field.is_message:
             inner = layout.inner[field.type]
             if field.length is None:
-                return self._fill(inner, value)
-            return [self._fill(inner, each) for each in value]
+                return self._shape(inner, value)
+            return [self._shape(inner, each) for each in value]
         if field.type == "string":
             return value
         if field.length is None:

@@ -1,6 +1,5 @@
 """The parameters of a ROS 2 node, by the services that every node offers for them."""
 
-import base64
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mapspeak.errors import LinkError
+from mapspeak.ros.messages.fields import bytes_of
 
 FIELD_OF_KIND = {
     1: "bool_value",
@@ -72,7 +72,9 @@ class ParameterServices(ABC):
         if value is not None:
             asked = {"names": [name]}
             answer = await self._ask(node, "get_parameter_types", "GetParameterTypes", asked)
-            written = _write(value, wanted=_first_of(answer.get("types")))
+            written = _write(
+                value, wanted=(bytes_of(answer.get("types") or b"", "types") or b"\0")[0]
+            )
         parameters = {"parameters": [{"name": name, "value": written}]}
         answer = await self._ask(node, "set_parameters", "SetParameters", parameters)
         for result in _part(answer, "results", node):
@@ -98,12 +100,6 @@ def _refused(node: str, name: str, value: object, said: object) -> LinkError:
         f"{node} refuses {name} = {str(value)[:80]}: {reason}",
         hint="Read the parameter and its type first; give a value of that type.",
     )
-
-
-def _first_of(numbers: Any) -> int:  # noqa: ANN401 - uint8[]: base64, bytes or a list
-    if isinstance(numbers, str):
-        numbers = base64.b64decode(numbers)
-    return int(numbers[0]) if numbers is not None and len(numbers) else 0
 
 
 def _part(answer: Any, key: str, node: str) -> Any:  # noqa: ANN401 - ROS JSON enters here

@@ -8,9 +8,9 @@ from typing import Any
 import anyio.abc
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.definitions.checking import check_field
+from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.definitions.texts import GENERATED, known_definitions, write_definition
-from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
+from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook
 from mapspeak.ros.definitions.typestore import name_in_ros2
 from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub
@@ -74,35 +74,9 @@ class Interfaces:
         Raises:
             LinkError: A field is not of that type, or its value does not fit.
         """
-        if not isinstance(message, Mapping):
-            raise _misfit(name, "message", message)
-        fields = {each.name: each for each in self._book[name].fields}
-        for given in message:
-            if given not in fields:
-                raise LinkError(
-                    f"Message type {name} does not have a field {given}.", hint="Leave it out."
-                )
-        return {
-            each.name: self._fill_field(each, message[each.name])
-            if each.name in message
-            else self._book.default(each)
-            for each in fields.values()
-        }
-
-    def _fill_field(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
-        if not field.is_message and field.type not in TIMES:
-            return check_field(self._book, field, value, path=field.name)
-        if field.length is None:
-            return self._fill_message(field, value)
-        if not isinstance(value, list | tuple) or (field.length and len(value) != field.length):
-            raise _misfit(field.type, field.name, value)
-        return [self._fill_message(field, each) for each in value]
-
-    def _fill_message(self, field: Field, value: object) -> dict[str, Any]:
-        if field.type in TIMES and isinstance(value, Mapping):
-            # A stamp in the words of ROS 2 is silently replaced.
-            value = value if {"secs", "nsecs"} <= set(value) else {"secs": 0, "nsecs": 0}
-        return self.fill(field.type, value)
+        if self._dialect is Dialect.ROS1:
+            message = _with_own_times(message)
+        return self._book.fill(name, check_message(self._book, name, message))
 
     def _detail(self, name: str) -> dict[str, object]:
         message = self._book[name]
@@ -129,10 +103,15 @@ def _example(field: Field) -> str:
     return {"string": "", "bool": "False"}.get(field.type, "{}")
 
 
-def _misfit(wanted: str, name: str, value: object) -> LinkError:
-    return LinkError(
-        f"Expected {wanted} in {name}, got {type(value).__name__}.", hint="Look the type up."
-    )
+def _with_own_times(message: Any) -> Any:  # noqa: ANN401 - ROS JSON
+    """Return a message in which each stamp in the words of ROS 2 is silently replaced."""
+    if isinstance(message, list):
+        return [_with_own_times(each) for each in message]
+    if not isinstance(message, Mapping):
+        return message
+    if {"sec", "nanosec"} & message.keys():
+        return {"secs": 0, "nsecs": 0}
+    return {name: _with_own_times(value) for name, value in message.items()}
 
 
 LONGEST_COMPLAINT = 1000

@@ -1,12 +1,11 @@
 """Nav2's NavigateToPose, as rosbridge's action operations and as topics and services of ROS 2."""
 
-import base64
 import uuid
 from typing import Any
 
 from mapspeak.errors import MapspeakError
 from mapspeak.robot import GoalState, Robot
-from mapspeak.ros.messages.fields import Dialect, write_stamp
+from mapspeak.ros.messages.fields import Dialect, bytes_of, write_stamp
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.hub import Hub, Publication
@@ -83,7 +82,7 @@ class Nav2:
 
     async def cancel_goals(self, request: dict[str, Any]) -> dict[str, Any]:
         """Answer action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""
-        wanted = _uuid_bytes(request["goal_info"]["goal_id"]["uuid"])
+        wanted = bytes_of(request["goal_info"]["goal_id"]["uuid"], "uuid")
         chosen = self._drives.all
         if any(wanted):
             chosen = [drive for drive in chosen if uuid.UUID(drive.goal_id).bytes == wanted]
@@ -131,12 +130,3 @@ def _goal_info(drive: ServedDrive) -> dict[str, Any]:
 
 def _uuid_message(drive: ServedDrive) -> dict[str, Any]:
     return {"uuid": uuid.UUID(drive.goal_id).bytes}
-
-
-def _uuid_bytes(value: object) -> bytes:
-    """Return the bytes of uint8[16]: base64 text, as rosbridge writes it, or a list."""
-    try:
-        data = base64.b64decode(value) if isinstance(value, str) else bytes(value)  # type: ignore[call-overload]
-    except (TypeError, ValueError):
-        data = b""
-    return data.ljust(16, b"\0")[:16]

@@ -100,7 +100,7 @@ async def test_an_answer_counts_though_an_earlier_call_never_had_one() -> None:
         ("/nothing", None, {}, "Nobody serves"),
         ("/switch", "std_srvs/srv/Trigger", {}, "is a std_srvs/SetBool"),
         ("/switch", SET_BOOL, {"on": True}, "'on'"),
-        ("no name", None, {}, "no full name"),
+        ("no name", None, {}, "not the name of a ROS topic"),
     ],
 )
 async def test_a_call_that_cannot_be_is_an_error(

@@ -1,6 +1,5 @@
 """Actions of ROS 2: goals over the connection, and the latched list of all goals' states."""
 
-import base64
 from collections.abc import Iterator, Mapping
 from functools import partial
 
@@ -9,7 +8,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.ros.actions.client import GONE, RESULT_LATE, UNSERVED, ActionClient
 from mapspeak.ros.activity import ActionEnd, ActionGoal, ActionState
-from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.messages.fields import Message, bytes_of
 from mapspeak.ros.port import RosConnection
 
 CANCEL_TYPE, STATUS_TYPE = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"
@@ -344,11 +343,9 @@ def _read_statuses(message: Message) -> Iterator[tuple[str, ActionState]]:
     entries = message.get("status_list")
     for entry in entries if isinstance(entries, list) else []:
         try:
-            # The 16 bytes of an id come as a list, as base64 or as bytes.
-            uuid = entry["goal_info"]["goal_id"]["uuid"]
-            raw = base64.b64decode(uuid, validate=True) if isinstance(uuid, str) else bytes(uuid)
-            yield raw.hex(), STATES[entry["status"]]
-        except (KeyError, TypeError, ValueError):
+            uuid = bytes_of(entry["goal_info"]["goal_id"]["uuid"], "uuid")
+            yield uuid.hex(), STATES[entry["status"]]
+        except (KeyError, TypeError, LinkError):
             continue
 
 

@@ -102,12 +102,12 @@ def _check(book: TypeBook, type_name: str, message: object, *, path: str) -> dic
     if strangers:
         raise _stranger(strangers[0], message_type, path)
     return {
-        name: check_field(book, fields[name], value, path=_join(path, name))
+        name: _check_field(book, fields[name], value, path=_join(path, name))
         for name, value in message.items()
     }
 
 
-def check_field(book: TypeBook, field: Field, value: object, *, path: str) -> Any:  # noqa: ANN401 - ROS JSON
+def _check_field(book: TypeBook, field: Field, value: object, *, path: str) -> Any:  # noqa: ANN401 - ROS JSON
     """Return one field as it may be sent; see `check_message`."""
     if field.length is None:
         return _check_value(book, field, value, path=path)

@@ -175,6 +175,22 @@ class TypeBook:
         named = [kind for kind in dict.fromkeys(types) if "/" in kind]
         return [kind for kind in named if kind not in self.texts]
 
+    def fill(self, name: str, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a checked message with all its fields; those left out hold their defaults."""
+        return {
+            field.name: self._fill_field(field, message[field.name])
+            if field.name in message
+            else self.default(field)
+            for field in self[name].fields
+        }
+
+    def _fill_field(self, field: Field, value: Any) -> Any:  # noqa: ANN401 - ROS JSON
+        if not field.is_message and field.type not in TIMES:
+            return value
+        if field.length is None:
+            return self.fill(field.type, value)
+        return [self.fill(field.type, each) for each in value]
+
     def default(self, field: Field, depth: int = 0) -> Any:  # noqa: ANN401 - ROS JSON
         """Return the default of a field."""
         if field.length is not None:

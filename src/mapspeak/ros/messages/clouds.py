@@ -1,7 +1,5 @@
 """Point clouds: sensor_msgs/PointCloud2 as an array of points."""
 
-import base64
-import binascii
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages.fields import Message, read_header, whole_of
+from mapspeak.ros.messages.fields import Message, bytes_of, read_header, whole_of
 
 HINT = "Look at the fields of the message; the node that sends it may be misconfigured."
 KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -48,7 +46,7 @@ def read_cloud(message: Message) -> PointCloud:
     )
     fields = [field for field in message.get("fields") or [] if isinstance(field, dict)]
     kind = _point_kind(fields, point_step, is_bigendian=bool(message.get("is_bigendian")))
-    data = _bytes_of(message.get("data"))
+    data = np.frombuffer(bytes_of(message.get("data")), dtype=np.uint8)
     row_step = row_step or width * point_step
     if width * height > MOST_POINTS or row_step < width * point_step:
         raise LinkError(f"A cloud of {width} x {height} points cannot be so.", hint=HINT)
@@ -93,23 +91,3 @@ def _point_kind(
         raise LinkError(
             f"The cloud's fields do not fit into {point_step} bytes.", hint=HINT
         ) from error
-
-
-def _bytes_of(data: object) -> NDArray[np.uint8]:
-    match data:
-        case np.ndarray():
-            return np.ascontiguousarray(data).view(np.uint8)
-        case bytes():
-            return np.frombuffer(data, dtype=np.uint8)
-        case str():
-            try:
-                return np.frombuffer(base64.b64decode(data, validate=True), dtype=np.uint8)
-            except binascii.Error as error:
-                raise LinkError("The cloud's data is no base64.", hint=HINT) from error
-        case list():
-            try:
-                return np.array(data, dtype=np.uint8)
-            except (OverflowError, ValueError, TypeError) as error:
-                raise LinkError("The cloud's data is no list of bytes.", hint=HINT) from error
-        case _:
-            raise LinkError("The cloud has no data.", hint=HINT)

@@ -3,6 +3,7 @@
 import base64
 import math
 import re
+from array import array
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
@@ -30,6 +31,23 @@ def decode_base64(text: str) -> bytes:
     """
     parts = (text[start : start + BASE64_PART] for start in range(0, len(text), BASE64_PART))
     return b"".join(base64.b64decode(part, validate=True) for part in parts)
+
+
+def bytes_of(value: object, name: str = "data") -> bytes:
+    """Return the value of a field of uint8[]: base64 text, bytes, an array or a list."""
+    try:
+        match value:
+            case str():
+                return decode_base64(value)
+            case bytes() | bytearray() | memoryview():
+                return bytes(value)
+            case np.ndarray() if value.dtype.itemsize == 1:
+                return value.tobytes()
+            case list() | tuple():
+                return array("B", value).tobytes()
+    except (OverflowError, TypeError, ValueError):
+        pass
+    raise misfit(name, value, "bytes, in base64 or as a list of numbers from 0 to 255")
 
 
 def misfit(name: str, value: object, wanted: str) -> LinkError:

@@ -1,9 +1,7 @@
 """Camera pictures of ROS messages, raw in every usual encoding or compressed, as PNG or JPEG."""
 
-import binascii
 import io
 import struct
-from array import array
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +13,7 @@ from PIL import Image
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages.fields import (
     Message,
-    decode_base64,
+    bytes_of,
     misfit,
     read_header,
     text_of,
@@ -58,7 +56,7 @@ def read_image(message: Message) -> EncodedPicture:
 def read_compressed_image(message: Message) -> EncodedPicture:
     """Read sensor_msgs/CompressedImage: JPEG and PNG pass as they are, depth is shaded."""
     frame_id, stamp_s = read_header(message)
-    form, data = text_of(message, "format"), bytes_of(message)
+    form, data = text_of(message, "format"), bytes_of(message.get("data"))
     if "compressedDepth" in form:
         return replace(
             _encode(shade_depth(read_compressed_depth(data, form)), message), is_depth=True
@@ -230,24 +228,6 @@ def read_depth(message: Message) -> Depth:
     return np.where(np.isfinite(depth_m) & (depth_m > 0.0), depth_m, np.nan)
 
 
-def bytes_of(message: Message) -> bytes:
-    """Return the field `data` of a message with uint8[]: base64 text, bytes, array or list."""
-    data = message.get("data")
-    try:
-        match data:
-            case str():
-                return decode_base64(data)
-            case bytes() | bytearray() | memoryview():
-                return bytes(data)
-            case np.ndarray() if data.dtype.itemsize == 1:
-                return data.tobytes()
-            case list() | tuple():
-                return array("B", data).tobytes()
-    except (binascii.Error, OverflowError, TypeError, ValueError):
-        pass
-    raise misfit("data", data, "bytes, in base64 or as a list of numbers from 0 to 255")
-
-
 def _read_samples(message: Message, encoding: str) -> NDArray[Any]:
     """Return an array of shape (rows, cols, samples), without padding, in native byte order."""
     if encoding not in SAMPLES:
@@ -261,7 +241,7 @@ def _read_samples(message: Message, encoding: str) -> NDArray[Any]:
     row_length = width_px * n_samples * n_bits // 8
     # Some drivers leave the step at zero, and mean rows without padding.
     step = whole_of(message, "step", low=0, high=LARGEST_STEP) or row_length
-    data = bytes_of(message)
+    data = bytes_of(message.get("data"))
     # The last row may come without its padding.
     needed = step * (height_px - 1) + row_length
     if step < row_length or len(data) < needed:
