@@ -192,7 +192,7 @@ async def test_another_type_than_the_robots_is_refused() -> None:
             connection.advertise("/cmd_vel", type_name="geometry_msgs/msg/TwistStamped")
         with pytest.raises(LinkError, match="is a geometry_msgs/Twist"):
             connection.subscribe("/cmd_vel", type_name="std_msgs/msg/String")
-        with pytest.raises(LinkError, match="no type"):
+        with pytest.raises(LinkError, match="not the name of a ROS type"):
             connection.advertise("/said", type_name="string")
 
 
