@@ -17,7 +17,7 @@ from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
-from mapspeak.links.rosbridge.protocol.conversation import Conversation, Told
+from mapspeak.links.rosbridge.protocol.conversation import Conversation, ServerEvent
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid, write_grid
@@ -55,7 +55,7 @@ def _measure_decoding(side: int) -> Iterator[Figure]:
 
     def grid_of(event: object) -> OccupancyGrid:
         match event:
-            case Told(values=heard):
+            case ServerEvent(values=heard):
                 return read_grid(heard)
             case _:
                 raise TypeError(event)

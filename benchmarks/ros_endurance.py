@@ -22,7 +22,7 @@ from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RosbridgeClient, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
-from mapspeak.links.rosbridge.protocol.conversation import Conversation, FrameRefused, Told
+from mapspeak.links.rosbridge.protocol.conversation import Conversation, FrameRefused, ServerEvent
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid, write_grid
@@ -121,7 +121,7 @@ def _spoil(frame: bytes, chance: random.Random) -> bytes:
 
 def _read(event: object) -> NDArray[np.int8] | None:
     """Read what may be a map; what is none has to be said by an error of ours."""
-    if isinstance(event, Told) and event.key == "/map":
+    if isinstance(event, ServerEvent) and event.key == "/map":
         try:
             return read_grid(event.values).cells
         except MapspeakError:

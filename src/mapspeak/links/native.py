@@ -38,6 +38,7 @@ from mapspeak.ros.messages.fields import (
 from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import RosConnection, RosGraph
 
+QoS = Any  # a quality of service in each link's own terms
 SEND_GOAL = "/_action/send_goal"
 DEPTH, BULKY_DEPTH = 200, 5
 """Queue depth of a subscription."""
@@ -45,7 +46,7 @@ LISTENER_S = 1.0
 """Longest wait for a known subscriber to connect to an advertised topic."""
 
 
-class Reader(Protocol):
+class TopicReader(Protocol):
     """The reader of one topic."""
 
     def close(self) -> None:
@@ -82,7 +83,7 @@ class Reading:
 
     quality: object
     writers: frozenset[bytes]
-    reader: Reader | None = None
+    reader: TopicReader | None = None
     decoded_s: float = float("-inf")
 
 
@@ -124,15 +125,17 @@ class NativeLink(RosConnection):
         """Return the readers of a topic, without us."""
 
     @abstractmethod
-    def _quality(self, *, is_reliable: bool, is_latched: bool, depth: int) -> Any:  # noqa: ANN401
+    def _quality(self, *, is_reliable: bool, is_latched: bool, depth: int) -> QoS:
         """Return a quality of service."""
 
     @abstractmethod
-    def _read(self, topic: str, type_name: str, quality: Any, decode: Decode, take: Take) -> Reader:  # noqa: ANN401
+    def _read(
+        self, topic: str, type_name: str, quality: QoS, decode: Decode, take: Take
+    ) -> TopicReader:
         """Begin to read; `decode` is called in another thread, `take` in the event loop."""
 
     @abstractmethod
-    def _write_to(self, topic: str, type_name: str, quality: Any) -> Writer:  # noqa: ANN401
+    def _write_to(self, topic: str, type_name: str, quality: QoS) -> Writer:
         """Begin to write."""
 
     @abstractmethod

@@ -22,7 +22,7 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     Event,
     EventKind,
     FrameRefused,
-    Told,
+    ServerEvent,
     write_operation,
 )
 from mapspeak.ros.port import new_id
@@ -32,8 +32,8 @@ def frame(operation: dict[str, Any]) -> bytes:
     return orjson.dumps(operation)
 
 
-def told(event: Event | None, kind: EventKind) -> Told:
-    assert isinstance(event, Told)
+def told(event: Event | None, kind: EventKind) -> ServerEvent:
+    assert isinstance(event, ServerEvent)
     assert event.kind is kind
     return event
 
@@ -80,10 +80,10 @@ def test_answers_carry_the_id_of_their_call() -> None:
     conversation = Conversation()
     good = {"op": "service_response", "id": "b", "values": {"sum": 3}, "result": True}
     bad = {"op": "service_response", "id": "a", "values": "no such service", "result": False}
-    assert conversation.receive(frame(good), is_text=True) == Told(
+    assert conversation.receive(frame(good), is_text=True) == ServerEvent(
         kind=EventKind.ANSWERED, key="b", values={"sum": 3}
     )
-    assert conversation.receive(frame(bad), is_text=True) == Told(
+    assert conversation.receive(frame(bad), is_text=True) == ServerEvent(
         kind=EventKind.ANSWERED, key="a", is_result=False, values="no such service"
     )
 
@@ -96,7 +96,7 @@ def test_only_the_status_of_an_action_says_how_it_ended() -> None:
         "result": True,
         "values": {"error_code": 0},
     }
-    assert Conversation().receive(frame(aborted), is_text=True) == Told(
+    assert Conversation().receive(frame(aborted), is_text=True) == ServerEvent(
         kind=EventKind.ENDED, key="goal", status=6, values={"error_code": 0}
     )
 
@@ -105,10 +105,10 @@ def test_feedback_and_remarks_are_told_apart() -> None:
     conversation = Conversation()
     feedback = {"op": "action_feedback", "id": "g", "values": {"distance_remaining": 1.5}}
     remark = {"op": "status", "level": "error", "msg": "no", "id": "x"}
-    assert conversation.receive(frame(feedback), is_text=True) == Told(
+    assert conversation.receive(frame(feedback), is_text=True) == ServerEvent(
         kind=EventKind.FED_BACK, key="g", values={"distance_remaining": 1.5}
     )
-    assert conversation.receive(frame(remark), is_text=True) == Told(
+    assert conversation.receive(frame(remark), is_text=True) == ServerEvent(
         kind=EventKind.NOTED, key="error", values="no"
     )
 

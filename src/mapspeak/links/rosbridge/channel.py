@@ -11,7 +11,7 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.connection import SocketConnection
-from mapspeak.links.rosbridge.protocol.conversation import Event, Told, write_operation
+from mapspeak.links.rosbridge.protocol.conversation import Event, ServerEvent, write_operation
 from mapspeak.links.rosbridge.websocket import open_websocket
 from mapspeak.ros.patience import Patience
 
@@ -120,7 +120,7 @@ class Channel:
         deadline_s = anyio.current_time() + timeout_s
         connection = await self._wait_for_connection(timeout_s)
         n_answers = connection.n_answers
-        answer: Told | None = None
+        answer: ServerEvent | None = None
         with anyio.move_on_after(deadline_s - anyio.current_time()) as limit:
             answer = await connection.ask(text, call_id=call_id)
         if limit.cancelled_caught:
@@ -229,7 +229,7 @@ class Channel:
         )
 
 
-def _values_of(answer: Told, what: str) -> object:
+def _values_of(answer: ServerEvent, what: str) -> object:
     if answer.is_result:
         return answer.values
     said = answer.values if isinstance(answer.values, str) else ""

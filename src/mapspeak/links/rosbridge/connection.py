@@ -16,7 +16,7 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     Event,
     EventKind,
     FrameRefused,
-    Told,
+    ServerEvent,
 )
 from mapspeak.links.rosbridge.websocket import Received, SocketClosed, WebSocket
 from mapspeak.ros.patience import Patience
@@ -44,7 +44,7 @@ class SocketConnection:
         self._conversation = Conversation()
         self._unsent, self._to_send = anyio.create_memory_object_stream[bytes](MAX_UNSENT)
         self._pending: dict[str, anyio.Event] = {}
-        self._answers: dict[str, Told] = {}
+        self._answers: dict[str, ServerEvent] = {}
         self._may_go = anyio.Event()
         self._is_sent = anyio.Event()
         self.is_over = anyio.Event()
@@ -71,7 +71,7 @@ class SocketConnection:
                 hint="Its network may be overloaded or gone: check the connection and try again.",
             ) from None
 
-    async def ask(self, text: bytes, *, call_id: str) -> Told | None:
+    async def ask(self, text: bytes, *, call_id: str) -> ServerEvent | None:
         """Return the answer to a call; None when the socket died first."""
         is_over = self._pending[call_id] = anyio.Event()
         try:
@@ -133,7 +133,7 @@ class SocketConnection:
         while True:
             event = await self._understand(await self._socket.receive())
             self._judge(event)
-            if isinstance(event, Told) and event.kind is EventKind.ANSWERED:
+            if isinstance(event, ServerEvent) and event.kind is EventKind.ANSWERED:
                 self._answer(event)
             elif event is not None:
                 self._tell(event)
@@ -176,7 +176,7 @@ class SocketConnection:
             # A fault of ours; one odd message must not cost the robot its connection.
             logger.exception("What the robot said could not be taken in")
 
-    def _answer(self, answer: Told) -> None:
+    def _answer(self, answer: ServerEvent) -> None:
         self.n_answers += 1
         # An answer that comes after its caller has gone is of no use to anybody.
         if answer.key in self._pending:

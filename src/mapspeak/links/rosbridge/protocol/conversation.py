@@ -40,7 +40,7 @@ class EventKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class ServerEvent:
     """One operation of the server.
 
     Attributes:
@@ -68,7 +68,7 @@ class FrameRefused:
     detail: str
 
 
-Event = Told | FrameRefused
+Event = ServerEvent | FrameRefused
 
 
 class Conversation:
@@ -125,7 +125,7 @@ _VALUES = {EventKind.PUBLISHED: "msg", EventKind.NOTED: "msg"}
 _KEYS = {EventKind.PUBLISHED: "topic", EventKind.NOTED: "level"}
 
 
-def _read(kind: EventKind, operation: dict[str, Any]) -> Told:
+def _read(kind: EventKind, operation: dict[str, Any]) -> ServerEvent:
     key = operation.get(name := _KEYS.get(kind, "id"))
     if not isinstance(key, str):
         raise FrameError(FrameFault.MISSING_FIELD, name)
@@ -134,7 +134,7 @@ def _read(kind: EventKind, operation: dict[str, Any]) -> Told:
     if is_message and not isinstance(operation.get(name), dict):
         raise FrameError(FrameFault.MISSING_FIELD, name)
     status = operation.get("status")
-    return Told(
+    return ServerEvent(
         kind=kind,
         key=key,
         values=values,
