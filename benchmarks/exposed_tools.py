@@ -32,7 +32,7 @@ from mapspeak.rosbridge_server.parameters import Parameters
 from mapspeak.rosbridge_server.rosapi import add_rosapi
 from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.server.app import build_server
-from mapspeak.server.tools.ros.goals import RosAccess, open_ros_access
+from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
 from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.session import Session
@@ -112,7 +112,7 @@ async def _count_over_rosbridge(dialect: Dialect, book: TypeBook, names: list[st
                 Simulation(load_world("flat_1"), seed=0), clock=Clock.VIRTUAL, has_detector=False
             ) as robot:
                 memory = SemanticMapStore(Path(folder) / "memory.yaml")
-                ros = open_ros_access(Session(robot, memory, lease_s=60.0, ros=client))
+                ros = RosAccess(Session(robot, memory, lease_s=60.0, ros=client))
                 await _publish_all(ros, topics, book, sent)
                 with anyio.move_on_after(ARRIVES_S):
                     await has_all.wait()

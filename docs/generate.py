@@ -11,6 +11,7 @@ import json
 import re
 import sys
 from collections.abc import Collection, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ SNAPSHOT = ROOT / "tests" / "snapshots" / "tools.json"
 WITH_TABLES = (ROOT / "README.md",)
 TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
 SOURCES = {
-    "robot": ("links", "ros", "server/tools/ros/inquiry.py"),
+    "robot": ("links", "ros", "server/text/ros/refusals.py"),
     "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
     "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
     "files": (
@@ -43,7 +44,7 @@ SOURCES = {
     ),
 }
 """Where the messages of each group are written, below src/mapspeak."""
-ERRORS = {"ConfigError", "LinkError", "MapError", "GoalError", "PolicyError", "refuse"}
+ERRORS = {"ConfigError", "LinkError", "MapError", "GoalError", "PolicyError", "refuse", "Refusal"}
 LEFT_OUT = "…"
 LEAST_WORDS = 3
 TABLE = re.compile(r"(?<=<!-- tools -->\n).*?(?=<!-- /tools -->)", re.DOTALL)
@@ -73,7 +74,9 @@ def write_documents() -> dict[Path, str]:
     documents[TROUBLES] = _read(TROUBLES)
     for group in SOURCES:
         between = re.compile(rf"(?<=<!-- {group} -->\n).*?(?=<!-- /{group} -->)", re.DOTALL)
-        rows = "\n".join(f"| {said} | {hint} |" for said, hint in sorted(set(_messages(group))))
+        rows = "\n".join(
+            f"| {said} | {hint} |" for said, hint in sorted(set(_messages(group, by_name)))
+        )
         told = f"| message | what to do |\n|---|---|\n{rows}\n"
         documents[TROUBLES] = between.sub(lambda _, told=told: told, documents[TROUBLES])  # type: ignore[misc]
     documents[REFERENCE] = _reference(toolsets)
@@ -82,8 +85,8 @@ def write_documents() -> dict[Path, str]:
     return documents
 
 
-def _messages(group: str) -> Iterator[tuple[str, str]]:
-    """Find the messages that source files raise, each with its hint."""
+def _messages(group: str, tools: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Find the messages that source files raise, or keep as templates, each with its hint."""
     for place in SOURCES[group]:
         path = ROOT / "src" / "mapspeak" / place
         for file in [path] if path.is_file() else sorted(path.rglob("*.py")):
@@ -97,11 +100,21 @@ def _messages(group: str) -> Iterator[tuple[str, str]]:
             }
             for node in ast.walk(tree):
                 if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ERRORS:
-                    named = {each.arg: each.value for each in node.keywords}
-                    said = node.args[0] if node.args else None
-                    told = _say(said, texts), _say(named.get("hint"), texts)
+                    told = _say_call(node, texts, tools)
                     if all(len(re.findall(r"[a-z]{2,}", text)) >= LEAST_WORDS for text in told):
                         yield told
+
+
+def _say_call(
+    call: ast.Call, texts: dict[str, ast.expr], tools: Collection[str]
+) -> tuple[str, str]:
+    """Return the message and the hint of an error that is made, or of the template of one."""
+    said, hint = (*call.args, None, None)[:2]
+    if getattr(call.func, "id", "") == "Refusal":
+        fill = partial(FIELD.sub, lambda gap: gap[1] if gap[1] in tools else LEFT_OUT)
+        return fill(_say(said, texts)), fill(_say(hint, texts))
+    named = {each.arg: each.value for each in call.keywords}
+    return _say(said, texts), _say(named.get("hint"), texts)
 
 
 def _say(node: ast.expr | None, texts: dict[str, ast.expr]) -> str:

@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from fakes import two_rooms
+from mapspeak.ros.hearing import Heard
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.grids import write_grid
-from mapspeak.server.tools.ros.reading import Heard, say_rate, say_stamp
+from mapspeak.server.text.ros.listening import say_rate, say_stamp
 from rosbridge_robot import ScriptedRobot
 from rosserved import at_time, on_our_server, on_script, publishing
 

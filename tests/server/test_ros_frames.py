@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from mapspeak.geometry import Pose
+from mapspeak.ros.hearing import FrameLink
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
-from mapspeak.server.tools.ros.frames import FrameLink, say_frames
+from mapspeak.server.text.ros.frames import say_frames
 from rosbridge_robot import ScriptedRobot
 from rosserved import at_time, on_script, publishing
 
@@ -127,7 +128,27 @@ async def test_the_transform_between_two_frames_is_told_with_the_way_between_the
         gap = await caller.refuse("ros_frames", duration_s=0.2, frame="arm", in_frame="laser")
     assert text == (
         "camera in laser: x 0.200, y 0.200, z 0.000 m; roll -90.0, pitch 90.0, yaw 0.0 deg\n"
-        "way: laser > base_footprint > camera"
+        "way: laser > base_footprint > camera\noldest: all of it is static"
     )
     assert "x 0.100, y 0.000, z 0.300 m; roll 90.0, pitch 0.0, yaw 0.0 deg" in mounted
     assert "no frame 'arm'" in gap
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+async def test_a_transform_is_told_with_the_age_of_its_oldest_part(
+    tmp_path: Path, ros: int
+) -> None:
+    scripted = ScriptedRobot(ros=ros)
+    moving = scripted.transforms(Pose(1.0, 2.0))
+    async with (
+        at_time(scripted, tmp_path, 21.0) as (_, caller),
+        publishing(scripted, "/tf", moving),
+    ):
+        whole = await caller.ask("ros_frames", duration_s=0.4, frame="base_footprint")
+        part = await caller.ask(
+            "ros_frames", duration_s=0.4, frame="odom", in_frame="base_footprint"
+        )
+    aged = r"oldest: map > odom: [\d.]+ Hz, stamp 14\.00 s behind robot time - LATE"
+    assert re.fullmatch(aged, whole.splitlines()[-1])
+    assert "way: base_footprint > odom\noldest: odom > base_footprint: " in part
+    assert part.endswith("stamp 13.00 s behind robot time - LATE")

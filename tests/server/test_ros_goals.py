@@ -15,12 +15,10 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.activity import ActionGoal, ActionState
-from mapspeak.ros.messages.fields import Dialect, write_header
+from mapspeak.ros.messages.fields import Dialect, Message, write_header
 from mapspeak.ros.messages.poses import write_pose
 from mapspeak.safety import CommandKind, Policy
-from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.goals import ActionBook
-from mapspeak.server.tools.ros.inquiry import RosInquiry
+from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.session import Session
 from rosbridge_robot import ABORTED, CANCELED, SUCCEEDED, ScriptedRobot
 from rosbridge_script import PATIENCE_S, Operation, running
@@ -313,7 +311,7 @@ async def test_a_goal_that_does_not_fit_is_not_sent(tmp_path: Path) -> None:
 @asynccontextmanager
 async def sending(
     scripted: ScriptedRobot, folder: Path
-) -> AsyncGenerator[tuple[RosbridgeClient, ActionBook]]:
+) -> AsyncGenerator[tuple[RosbridgeClient, RosAccess]]:
     """Gives what sends goals with little patience, and its connection."""
     with anyio.fail_after(PATIENCE_S):
         async with (
@@ -322,8 +320,12 @@ async def sending(
         ):
             memory = SemanticMapStore(folder / "map.yaml")
             session = Session(FakeRobot(two_rooms()), memory, lease_s=60.0, ros=client)
-            commands = RosCommands(lambda: client)
-            yield client, ActionBook(RosInquiry(session), commands)
+            yield client, RosAccess(session)
+
+
+async def send_by(ros: RosAccess, action: str, goal: Message, type_name: str) -> TrackedGoal:
+    described = await ros.inquiry.describe(type_name, kind="action")
+    return await ros.goals.send(action, goal, described=described)
 
 
 async def lose(scripted: ScriptedRobot, client: RosbridgeClient, *, status: int | None) -> None:
@@ -339,8 +341,8 @@ async def lose(scripted: ScriptedRobot, client: RosbridgeClient, *, status: int 
 async def test_a_goal_without_a_sign_of_life_is_rejected_and_cancelled(tmp_path: Path) -> None:
     scripted = with_types(ScriptedRobot())
     scripted.accepts_goals = False
-    async with sending(scripted, tmp_path) as (_, book):
-        job = await book.send(ACTION, GOAL, type_name="nav2_msgs/NavigateToPose")
+    async with sending(scripted, tmp_path) as (_, ros):
+        job = await send_by(ros, ACTION, GOAL, "nav2_msgs/NavigateToPose")
         await scripted.until(lambda: scripted.server.asked("cancel_action_goal"))
     assert job.goal.state is ActionState.REJECTED
     assert "gave no sign of taking the goal" in job.goal.reason
@@ -358,10 +360,10 @@ async def test_a_goal_is_found_again_after_a_reconnection_or_told_as_lost(
     tmp_path: Path, status: int | None, state: ActionState, said: str
 ) -> None:
     scripted = with_types(ScriptedRobot())
-    async with sending(scripted, tmp_path) as (client, book):
-        job = await book.send(ACTION, GOAL, type_name="nav2_msgs/NavigateToPose")
+    async with sending(scripted, tmp_path) as (client, ros):
+        job = await send_by(ros, ACTION, GOAL, "nav2_msgs/NavigateToPose")
         await lose(scripted, client, status=status)
-        await book.wait(job, wait_s=PATIENCE_S)
+        await ros.goals.wait(job, wait_s=PATIENCE_S)
     assert job.goal.state is state
     assert said in job.goal.reason
 
@@ -400,12 +402,12 @@ async def test_on_ros_1_the_list_of_goals_tells_the_end_when_no_result_does(
     kind = {"type": "move_base_msgs/MoveBaseActionGoal"}
     scripted.services["/rosapi/topic_type"] = lambda _: kind
     jobs: list[ActionGoal] = []
-    async with sending(scripted, tmp_path) as (_, book), anyio.create_task_group() as tasks:
+    async with sending(scripted, tmp_path) as (_, ros), anyio.create_task_group() as tasks:
 
         async def pursue() -> None:
             goal = {"target_pose": POSE}
-            job = await book.send(MOVE_BASE, goal, type_name="move_base_msgs/MoveBase")
-            await book.wait(job, wait_s=PATIENCE_S)
+            job = await send_by(ros, MOVE_BASE, goal, "move_base_msgs/MoveBase")
+            await ros.goals.wait(job, wait_s=PATIENCE_S)
             jobs.append(job.goal)
 
         tasks.start_soon(pursue)

@@ -89,7 +89,7 @@ def _load(file: Path) -> "tuple[OwnersEntry, ...]":
 async def _open(
     entries: "tuple[OwnersEntry, ...]", robot: str, guard: GuardChoice
 ) -> "AsyncGenerator[tuple[SkillBook, SkillRuns]]":
-    from mapspeak.server.tools.ros.goals import open_ros_access  # noqa: PLC0415
+    from mapspeak.server.tools.ros.goals import RosAccess  # noqa: PLC0415
     from mapspeak.server.tools.skills.book import SkillBook  # noqa: PLC0415
     from mapspeak.skills.runs import SkillRuns  # noqa: PLC0415
 
@@ -101,7 +101,7 @@ async def _open(
             await session.ros.wait_until_connected()
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(session.keep_watch)
-            book = SkillBook(session, open_ros_access(session), entries)
+            book = SkillBook(session, RosAccess(session), entries)
             runs = SkillRuns(questions=book.questions)
             tasks.start_soon(runs.keep_going, anyio.sleep_forever)
             await anyio.lowlevel.checkpoint()

@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal
-from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.messages.fields import VELOCITIES, Message, bare_type
 from mapspeak.ros.port import RosConnection
 from mapspeak.safety.commands import (
     Act,
@@ -29,9 +29,6 @@ from mapspeak.safety.velocities import (
 
 T = TypeVar("T")
 
-VELOCITY_TYPE = re.compile(
-    r"geometry_msgs/(?:msg/)?Twist(?:Stamped)?|ackermann_msgs/(?:msg/)?AckermannDrive(?:Stamped)?"
-)
 CANCEL_TYPE = re.compile(r"actionlib_msgs/(?:msg/)?GoalID")
 CANCEL_SERVICE_TYPE = re.compile(r"action_msgs/(?:srv/)?CancelGoal")
 HARMLESS = frozenset(
@@ -287,4 +284,4 @@ def _is_stop(command: Publish | Call) -> bool:
 
 
 def _is_velocity(type_name: str) -> bool:
-    return VELOCITY_TYPE.fullmatch(type_name) is not None
+    return bare_type(type_name) in VELOCITIES

@@ -33,7 +33,7 @@ from mapspeak.server.remarks import Remarks
 from mapspeak.server.text.offered import offering, say_error, write_instructions
 from mapspeak.server.text.wording import shorten_report, show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking, client_of
-from mapspeak.server.tools.ros.goals import RosAccess, open_ros_access
+from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.exposing import Exposure
@@ -328,7 +328,7 @@ def build_server(
         session.episodes.close()
     elif session.ros is not None:
         session.ros.advertise_early()
-    book = SkillBook(session, ros := open_ros_access(session), skills)
+    book = SkillBook(session, ros := RosAccess(session), skills)
     runs = SkillRuns(partial(_count_stops, session), book.questions)
     known = build_toolsets(session, representation, ros=ros, runs=runs, book=book)
     sets = {*toolsets} | ({"skills"} if expose or skills else set())

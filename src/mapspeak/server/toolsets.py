@@ -12,7 +12,7 @@ from mapspeak.server.tools.memory import MemoryTools
 from mapspeak.server.tools.paper import PaperTools
 from mapspeak.server.tools.places import PlaceTools
 from mapspeak.server.tools.ros.actions import ActionTools
-from mapspeak.server.tools.ros.goals import RosAccess, open_ros_access
+from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.measuring import MeasuringTools
 from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
@@ -44,7 +44,7 @@ def build_toolsets(
         runs: The runs of its skills.
         book: Its skills.
     """
-    find, ros, runs = FindTools(session), ros or open_ros_access(session), runs or SkillRuns()
+    find, ros, runs = FindTools(session), ros or RosAccess(session), runs or SkillRuns()
     book = book or SkillBook(session, ros)
     run_tools = SkillRunTools(runs)
     return {
@@ -55,22 +55,16 @@ def build_toolsets(
         "routes": tools_of(RouteTools(session)),
         "paper": tools_of(PaperTools(session)),
         "memory": tools_of(find, MemoryTools(session)),
-        "ros": _ros_tools(session, ros),
+        "ros": tools_of(
+            TopicTools(ros),
+            MeasuringTools(ros),
+            ServiceTools(ros),
+            ActionTools(ros),
+            NodeTools(ros),
+        ),
         "skills": tools_of(run_tools),
         "missions": tools_of(MissionTools(book, runs), run_tools),
     }
-
-
-def _ros_tools(session: Session, ros: RosAccess) -> list[Tool]:
-    inquiry, commands = ros.inquiry, ros.commands
-    overview, *nodes = tools_of(NodeTools(inquiry, commands))
-    others = tools_of(
-        TopicTools(session, inquiry, commands, ros.publisher),
-        MeasuringTools(session, inquiry),
-        ServiceTools(session, inquiry, commands),
-        ActionTools(inquiry, commands, ros.goals),
-    )
-    return [overview, *others, *nodes]
 
 
 def choose_tools(

@@ -1,6 +1,5 @@
 """Topics, services and actions of a robot as tools: found, typed, checked, called, withdrawn."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.rosbridge_server.hub import Topic
 from mapspeak.safety import CommandKind, Patterns, Policy
-from mapspeak.server.tools.ros.goals import open_ros_access
+from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import RosInquiry
 from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.exposing import Exposure
@@ -264,7 +263,7 @@ async def test_a_robot_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> No
             raise LinkError("The robot is not there yet.", hint="Wait for it.")
 
     session = Session(FakeRobot(), SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
-    ros = replace(open_ros_access(session), inquiry=Absent(session))
+    ros = RosAccess(session, Absent(session))
     board = SkillBoard(SkillRuns(), others=tuple)
 
     async def tell() -> None:

@@ -185,6 +185,15 @@ BULKY = frozenset(
     }
 )
 """Types of large arrays without fixed length, which come faster in binary."""
+VELOCITIES = frozenset(
+    {
+        "geometry_msgs/Twist",
+        "geometry_msgs/TwistStamped",
+        "ackermann_msgs/AckermannDrive",
+        "ackermann_msgs/AckermannDriveStamped",
+    }
+)
+"""Types on which a robot goes on until it is told otherwise, or its driver loses patience."""
 
 
 class Dialect(StrEnum):
@@ -218,6 +227,16 @@ def read_stamp(stamp: Message) -> float:
     )
     rest = whole_of(stamp, "nsecs" if is_ros1 else "nanosec", low=0, high=NANOSECONDS - 1)
     return whole_s + rest / NANOSECONDS
+
+
+def find_stamp(message: Message) -> float | None:
+    """Return a message's own time in seconds of robot time; None where it has none."""
+    header = message.get("header")
+    stamp = (header if isinstance(header, Mapping) else message).get("stamp")
+    try:
+        return read_stamp(stamp) if isinstance(stamp, Mapping) else None
+    except LinkError:
+        return None
 
 
 def write_stamp(stamp_s: float, *, dialect: Dialect) -> dict[str, int]:

@@ -6,30 +6,20 @@ import anyio
 from mcp.server.mcpserver import Context
 from pydantic import Field
 
-from mapspeak.errors import GoalError, LinkError
-from mapspeak.ros.activity import ActionGoal, ActionState
+from mapspeak.errors import LinkError
 from mapspeak.ros.definitions.checking import check_message
-from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.safety import Act
-from mapspeak.server.text.offered import lead
+from mapspeak.server.text.ros.listening import list_page, say_loss
+from mapspeak.server.text.ros.refusals import ONE_OF_BOTH
+from mapspeak.server.text.ros.sent import say_goal, say_goals
+from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
-from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.frames import check_frames
-from mapspeak.server.tools.ros.goals import ActionBook, TrackedGoal
-from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
-from mapspeak.server.tools.ros.reports import (
-    Filter,
-    Page,
-    cut,
-    list_page,
-    say_loss,
-    show_message,
-)
-from mapspeak.server.tools.ros.views import view_fields
+from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
+from mapspeak.server.tools.ros.inquiry import full_name
+from mapspeak.server.tools.ros.publishing import check_frames
+from mapspeak.server.tools.ros.topics import Filter, Page
 from mapspeak.server.tools.toolset import ToolEffect, tool
-
-MOST_LISTED = 20
 
 Action = Annotated[str, Field(description="full name, such as /spin", max_length=200)]
 AnyAction = Annotated[
@@ -48,28 +38,13 @@ Handle = Annotated[
 ]
 CancelHandle = Annotated[str | None, Field(description="such as A1", max_length=40)]
 
-NEXT_STEP = {
-    ActionState.SUCCEEDED: "",
-    ActionState.ABORTED: "The action server gave up: see its result and reason.",
-    ActionState.CANCELLED: "It was cancelled before it was done.",
-    ActionState.REJECTED: "It was not taken: check its values, and that the server is active.",
-    ActionState.LOST: "Nobody knows how it ended: look at the robot, then send it again.",
-}
-UNANSWERED = (
-    "Should it be taken later, it is cancelled at once. Check that the server is active; what has "
-    "just started may not be found yet by all: then send it again."
-)
-GOES_ON = "It goes on. {ros_goal_status} waits for it, {ros_cancel_goal} ends it."
-
 
 class ActionTools:
     """Listing, describing, sending, asking, cancelling."""
 
-    def __init__(self, inquiry: RosInquiry, commands: RosCommands, book: ActionBook) -> None:
-        self._inquiry = inquiry
-        self._commands = commands
-        self._book = book
-        self._described: dict[str, Described] = {}
+    def __init__(self, ros: RosAccess) -> None:
+        self._inquiry = ros.inquiry
+        self._goals = ros.goals
 
     @tool("List ROS actions", ToolEffect.READS, leads="{ros_action} tells its fields.")
     async def ros_actions(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
@@ -77,16 +52,23 @@ class ActionTools:
 
         Use it to find one.
         """
-        actions = await self._inquiry.fetch_actions()
-        lines = {name: f"{name} {await self._say_type(name)}" for name in actions}
+        lines = {}
+        for name in await self._inquiry.fetch_actions():
+            try:
+                type_name = await self._inquiry.fetch_action_type(name)
+                said = await self._inquiry.say_type(type_name, kind="action")
+            except LinkError:
+                said = "(its type is not told)"
+            lines[name] = f"{name} {said}"
         return list_page("actions", lines, filter, page)
 
     @tool("One ROS action", ToolEffect.READS, leads="Use it before {ros_send_goal}.")
     async def ros_action(self, action: Action, type: ActionType = None) -> str:  # noqa: A002
         """Tell a ROS action's type, and the fields of its goal, result and feedback."""
         name = full_name(action)
-        said = await self._find_type(name, type)
-        return cut(f"{name} {said}\n{(await self._inquiry.describe(said)).say()}")
+        type_name = await self._inquiry.fetch_action_type(name, given=type)
+        described = await self._inquiry.describe(type_name, kind="action")
+        return cut(f"{name} {described.said}\n{described.say()}")
 
     @tool(
         "Send a ROS goal",
@@ -108,24 +90,23 @@ class ActionTools:
         """
         n_stops = self._inquiry.connection.started.n_stops
         name = full_name(action)
-        self._commands.check_name(Act(action=name, type=type or "", goal=fields))
-        said = await self._find_type(name, type)
-        described = await self._inquiry.describe(said)
-        checked = check_message(described.book, described.parts[0], fields)
-        await check_frames(self._inquiry, checked)
-        self._described[name] = described
+        self._inquiry.check_policy(Act(action=name, type=type or "", goal=fields))
+        type_name = await self._inquiry.fetch_action_type(name, given=type)
+        described = await self._inquiry.describe(type_name, kind="action")
+        goal = check_message(described.book, described.parts[0], fields)
+        await check_frames(self._inquiry, goal)
         client = client_of(context)
-        job = await self._book.send(
-            name, checked, type_name=described.type, client=client, n_stops=n_stops
+        job = await self._goals.send(
+            name, goal, described=described, client=client, n_stops=n_stops
         )
         try:
-            await self._book.wait(job, wait_s=wait_s)
+            await self._goals.wait(job, wait_s=wait_s)
         except anyio.get_cancelled_exc_class():
             # Whoever gives up waiting gives up the goal, as with navigate_to.
             with anyio.CancelScope(shield=True):
-                await self._book.cancel(job)
+                await self._goals.cancel(job)
             raise
-        return self._say_job(job)
+        return self._say(job)
 
     @tool("How a ROS goal stands", ToolEffect.READS)
     async def ros_goal_status(
@@ -136,10 +117,11 @@ class ActionTools:
         Use it to wait for the end; with an action it lists the goals its server knows.
         """
         if action is not None:
-            return await self._say_listed(full_name(action))
-        job = self._book.find(goal_id)
-        await self._book.wait(job, wait_s=wait_s)
-        return self._say_job(job)
+            lines, heard_s = await self._goals.list_goals(full_name(action))
+            return say_goals(lines, say_loss(self._inquiry.connection, since_s=heard_s))
+        job = self._goals.find(goal_id)
+        await self._goals.wait(job, wait_s=wait_s)
+        return self._say(job)
 
     @tool(
         "Cancel a ROS goal",
@@ -149,62 +131,20 @@ class ActionTools:
     async def ros_cancel_goal(self, goal_id: CancelHandle = None, action: AnyAction = None) -> str:
         """Cancel one goal by its goal_id, or every goal of a ROS action."""
         if (goal_id is None) == (action is None):
-            raise GoalError(
-                "Give either goal_id or action.",
-                hint="goal_id ends one goal that was sent here, action every goal of that action.",
-            )
+            raise ONE_OF_BOTH.error()
         if action is not None:
-            n_cancelled = await self._book.cancel_all(full_name(action))
+            n_cancelled = await self._goals.cancel_all(full_name(action))
             return f"{full_name(action)}: {say_count(n_cancelled, 'goal')} being cancelled."
-        job = self._book.find(goal_id)
+        job = self._goals.find(goal_id)
         if job.goal.is_over:
-            return f"{job.handle} was over already, nothing was cancelled.\n{self._say_job(job)}"
-        await self._book.cancel(job)
-        return self._say_job(job)
+            return f"{job.handle} was over already, nothing was cancelled.\n{self._say(job)}"
+        await self._goals.cancel(job)
+        return self._say(job)
 
-    async def _say_listed(self, action: str) -> str:
-        lines, heard_s = await self._book.list_goals(action)
-        loss = say_loss(self._inquiry.connection, since_s=heard_s)
-        head = f"{say_count(len(lines), 'goal')}, by the server's ids:"
-        return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *([loss] if loss else [])])
-
-    async def _find_type(self, action: str, given: str | None) -> str:
-        """Return an action's type as this ROS writes it; the given one where nobody tells it."""
-        if given is not None:
-            await self._inquiry.check_action(action)
-            return await self._inquiry.said(bare_type(given), kind="action")
-        type_name = await self._inquiry.fetch_action_type(action)
-        return await self._inquiry.said(type_name, kind="action")
-
-    async def _say_type(self, action: str) -> str:
-        try:
-            return await self._find_type(action, None)
-        except LinkError:
-            return "(its type is not told)"
-
-    def _say_job(self, job: TrackedGoal) -> str:
-        goal = job.goal
-        passed_s = (goal.ended_s or anyio.current_time()) - goal.sent_s
-        parts = [f"{job.handle} ({goal.action}): {goal.state} after {passed_s:.1f} s."]
-        loss = "" if goal.is_over else say_loss(self._inquiry.connection, since_s=goal.sent_s)
-        reason = f"{goal.reason.rstrip('. ')}." if goal.reason else ""
-        said = [part for part in (loss, reason, goal.afterwards, _say_next_step(goal)) if part]
-        parts.append(" ".join(said))
-        if goal.result is not None:
-            parts.append(f"result:\n{self._show_result(goal.action, goal.result)}")
-        elif goal.feedback is not None:
-            parts.append(f"latest feedback of {goal.n_feedback}:\n{show_message(goal.feedback)}")
-        return cut("\n".join(part for part in parts if part))
-
-    def _show_result(self, action: str, result: Message) -> str:
-        described = self._described.get(action)
-        fields = () if described is None else described.book[described.parts[1]].fields
-        views, plain = view_fields(fields, result)
-        shown = [f"{name}: {view.text}" for name, view in views.items()]
-        return "\n".join([*shown, *([show_message(plain)] if plain or not shown else [])])
-
-
-def _say_next_step(goal: ActionGoal) -> str:
-    if goal.state is ActionState.REJECTED and goal.is_withdrawn:
-        return UNANSWERED
-    return NEXT_STEP[goal.state] if goal.state in NEXT_STEP else lead(GOES_ON)
+    def _say(self, job: TrackedGoal) -> str:
+        return say_goal(
+            job.handle,
+            job.goal,
+            result_fields=job.result_fields,
+            connection=self._inquiry.connection,
+        )

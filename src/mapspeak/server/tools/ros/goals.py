@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import anyio
 
-from mapspeak.errors import GoalError
 from mapspeak.ros.actions import ActionClient, open_action
 from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.definitions.types import Field
 from mapspeak.ros.messages.fields import Dialect, Message
-from mapspeak.server.text.offered import lead
-from mapspeak.server.tools.ros.commands import Publisher, RosCommands
-from mapspeak.server.tools.ros.inquiry import RosInquiry
+from mapspeak.server.text.ros.refusals import refuse_goal
+from mapspeak.server.tools.ros.inquiry import Described, RosInquiry
+from mapspeak.server.tools.ros.publishing import Publisher
 from mapspeak.session import Session
 
 MOST_KEPT = 200
@@ -26,11 +26,13 @@ class TrackedGoal:
         handle: Such as A1.
         goal: As its action client knows it.
         action: That client.
+        result_fields: Of its result's type.
     """
 
     handle: str
     goal: ActionGoal
     action: ActionClient
+    result_fields: tuple[Field, ...]
 
 
 class ActionBook:
@@ -38,12 +40,12 @@ class ActionBook:
 
     Args:
         inquiry: Asks the robot.
-        commands: Tells the robot.
+        publisher: Advertises the topics of a ROS 1 action.
     """
 
-    def __init__(self, inquiry: RosInquiry, commands: RosCommands) -> None:
+    def __init__(self, inquiry: RosInquiry, publisher: Publisher) -> None:
         self._inquiry = inquiry
-        self._commands = commands
+        self._publisher = publisher
         self._jobs: OrderedDict[str, TrackedGoal] = OrderedDict()
         self._n_sent = 0
 
@@ -52,7 +54,7 @@ class ActionBook:
         action: str,
         goal: Message,
         *,
-        type_name: str,
+        described: Described,
         client: str = "",
         n_stops: int | None = None,
     ) -> TrackedGoal:
@@ -61,7 +63,7 @@ class ActionBook:
         Args:
             action: Its full name.
             goal: Fits its type.
-            type_name: Of the action, as "package/Type".
+            described: The type of the action.
             client: The client that sends it: when that client is gone, the goal ends.
             n_stops: The number of stops when the goal was requested.
 
@@ -69,13 +71,18 @@ class ActionBook:
             GoalError: There was a stop since the goal was requested.
         """
         await self._inquiry.check_action(action)
-        opened = await self._open(action, await self._inquiry.said(type_name, kind="action"))
+        opened = await self._open(action, described.said)
         connection = self._inquiry.connection
         for topic, topic_type in opened.advertise(connection).items():
-            await self._commands.prepare(topic, topic_type)
+            await self._publisher.prepare(topic, topic_type)
         sent = await opened.send(goal, through=connection, owner=client, n_stops=n_stops)
         self._n_sent += 1
-        job = TrackedGoal(handle=f"A{self._n_sent}", goal=sent, action=opened)
+        job = TrackedGoal(
+            handle=f"A{self._n_sent}",
+            goal=sent,
+            action=opened,
+            result_fields=described.answer_fields,
+        )
         self._jobs[job.handle] = job
         while len(self._jobs) > MOST_KEPT:
             self._jobs.popitem(last=False)
@@ -89,13 +96,8 @@ class ActionBook:
             GoalError: No goal has that handle.
         """
         key = next(reversed(self._jobs), "") if handle is None else handle.strip().upper()
-        job = self._jobs.get(key)
-        if job is None:
-            known = ", ".join(list(self._jobs)[-5:])
-            raise GoalError(
-                f"There is no goal {handle[:40]!r}." if handle else "No goal has been sent yet.",
-                hint=f"The latest are {known}." if known else lead("{ros_send_goal} sends one."),
-            )
+        if (job := self._jobs.get(key)) is None:
+            raise refuse_goal(handle, list(self._jobs))
         job.action.look()
         return job
 
@@ -161,32 +163,20 @@ class ActionBook:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class RosAccess:
     """One session's way to its ROS system; nothing is asked before it is used.
 
+    Args:
+        session: Holds the connection.
+        inquiry: Asks; one of the session's own when left out.
+
     Attributes:
-        inquiry: Asks.
-        commands: Tells.
         goals: Every goal that was sent.
         publisher: Publishes, one velocity at a time.
     """
 
-    session: Session
-    inquiry: RosInquiry
-    commands: RosCommands
-    goals: ActionBook
-    publisher: Publisher
-
-
-def open_ros_access(session: Session) -> RosAccess:
-    """Return the way to a session's ROS system."""
-    inquiry = RosInquiry(session)
-    commands = RosCommands(lambda: inquiry.connection)
-    return RosAccess(
-        session=session,
-        inquiry=inquiry,
-        commands=commands,
-        goals=ActionBook(inquiry, commands),
-        publisher=Publisher(session, commands),
-    )
+    def __init__(self, session: Session, inquiry: RosInquiry | None = None) -> None:
+        self.session = session
+        self.inquiry = inquiry or RosInquiry(session)
+        self.publisher = Publisher(session, self.inquiry)
+        self.goals = ActionBook(self.inquiry, self.publisher)

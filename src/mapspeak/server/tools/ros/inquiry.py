@@ -5,22 +5,30 @@ from dataclasses import dataclass, replace
 
 import anyio
 
-from mapspeak.errors import ConfigError, LinkError
-from mapspeak.installation import shell_command
+from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.definitions.checking import describe_type
-from mapspeak.ros.definitions.texts import (
-    find_parts,
-    kinds_of,
-    known_definitions,
-    split_parts,
-)
-from mapspeak.ros.definitions.types import TypeBook, find_odd_lines, parse_definition
+from mapspeak.ros.definitions.texts import find_parts, kinds_of, known_definitions, split_parts
+from mapspeak.ros.definitions.types import Field, TypeBook, find_odd_lines, parse_definition
+from mapspeak.ros.hearing import Heard, hear
 from mapspeak.ros.messages.fields import NAME, TYPE, Dialect, bare_type
 from mapspeak.ros.port import RosConnection, RosGraph, find_nearest
-from mapspeak.server.text.offered import lead
+from mapspeak.safety import Act, Call, GuardedConnection, Publish, SetParameter
+from mapspeak.server.text.ros.refusals import (
+    KNOWN_TYPE,
+    NO_NAME,
+    NO_ROS,
+    NO_ROS_TOOLS,
+    NO_TYPE,
+    NOT_INSTALLED,
+    ODD_LINE,
+    UNKNOWN_TYPE,
+    UNKNOWN_WITHIN,
+    UNTOLD_TYPE,
+    refuse_name,
+    refuse_without_ros,
+)
 from mapspeak.session import Session
 
-NO_ROS = "This robot is no ROS robot: the simulated one is none."
 ACTION_GOAL = "ActionGoal"
 MOST_NEAR = 5
 KEPT_S = 1.0
@@ -33,18 +41,20 @@ class Described:
 
     Attributes:
         type: As "package/Type".
+        said: As this ROS writes it, such as "nav_msgs/msg/Path".
         parts: The names of its parts: itself, or those of a service or an action.
         book: Holds them and all types within.
     """
 
     type: str
+    said: str
     parts: tuple[str, ...]
     book: TypeBook
 
     @property
-    def kind(self) -> str:
-        """The kind of the type: "msg", "srv" or "action"."""
-        return {1: "msg", 2: "srv", 3: "action"}[len(self.parts)]
+    def answer_fields(self) -> tuple[Field, ...]:
+        """The fields of a service's response, or of an action's result."""
+        return self.book[self.parts[1]].fields
 
     def say(self) -> str:
         """Return its fields down to the plain values, part by part."""
@@ -81,29 +91,40 @@ class RosInquiry:
         """
         connection = self._session.ros
         if connection is None:
-            raise LinkError(NO_ROS, hint=_say_how_to_get_ros())
+            raise refuse_without_ros(NO_ROS)
         return connection
 
-    @property
-    def now_s(self) -> float:
-        """Robot time."""
-        return self._session.robot.now_s
+    def check_policy(self, command: Publish | Call | Act | SetParameter) -> None:
+        """Return when a command is not denied for its name: said before anything else is checked.
+
+        Raises:
+            PolicyError: It is.
+        """
+        if isinstance(self.connection, GuardedConnection):
+            self.connection.check_name(command)
+
+    # --- names
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are, as they were a second ago at most."""
-        if self._graph is None or anyio.current_time() > self._asked_s + KEPT_S:
-            return await self._renew_graph()
-        # The kept graph does not answer for a robot that has gone.
-        await self.connection.wait_until_connected()
-        return self._graph
+        return await self._fetch_graph(is_fresh=anyio.current_time() <= self._asked_s + KEPT_S)
 
     async def fetch_topics(self) -> RosGraph:
         """Return the topics as they were a second ago at most; the actions may be older."""
-        if self._graph is not None and anyio.current_time() > self._listed_s + KEPT_S:
-            return await self._renew_topics(self._graph)
-        if self._graph is None:
-            return await self._renew_graph()
+        is_fresh = anyio.current_time() <= self._listed_s + KEPT_S
+        return await self._fetch_graph(is_fresh=is_fresh, topics_suffice=True)
+
+    async def _fetch_graph(self, *, is_fresh: bool, topics_suffice: bool = False) -> RosGraph:
+        # Also the kept graph does not answer for a robot that has gone.
         await self.connection.wait_until_connected()
+        if self._graph is not None and is_fresh:
+            return self._graph
+        if self._graph is not None and topics_suffice:
+            self._graph = replace(self._graph, types=await self.connection.fetch_topics())
+        else:
+            self._graph = await self.connection.fetch_graph()
+            self._asked_s = anyio.current_time()
+        self._listed_s = anyio.current_time()
         return self._graph
 
     async def fetch_dialect(self) -> Dialect:
@@ -114,7 +135,7 @@ class RosInquiry:
         """Return a topic's type as "package/Type"; ask again only for an unknown topic."""
         graph = self._graph
         if graph is None or topic not in graph.types:
-            graph = await (self._renew_graph() if graph is None else self._renew_topics(graph))
+            graph = await self._fetch_graph(is_fresh=False, topics_suffice=True)
         return graph.types.get(topic)
 
     async def fetch_topic_type(self, topic: str) -> str:
@@ -125,7 +146,7 @@ class RosInquiry:
         """
         found = await self.find_topic_type(topic)
         if found is None:
-            raise self.stranger("topic", topic, self._graph.types if self._graph else ())
+            raise refuse_name("topic", topic, self._graph.types if self._graph else ())
         return found
 
     async def fetch_service_type(self, service: str) -> str:
@@ -140,7 +161,7 @@ class RosInquiry:
             services = await self.connection.fetch_services()
             if service in services:
                 raise
-            raise self.stranger("service", service, services) from None
+            raise refuse_name("service", service, services) from None
 
     async def fetch_actions(self) -> tuple[str, ...]:
         """Return all actions; ROS 1 shows them by their topics."""
@@ -153,12 +174,12 @@ class RosInquiry:
             LinkError: There is none; names those most like it.
         """
         if action not in await self.fetch_actions():
-            actions = actions_of(await self._renew_graph())
+            actions = actions_of(await self._fetch_graph(is_fresh=False))
             if action not in actions:
-                raise self.stranger("action", action, actions)
+                raise refuse_name("action", action, actions)
 
-    async def fetch_action_type(self, action: str) -> str:
-        """Return an action's type as "package/Type".
+    async def fetch_action_type(self, action: str, *, given: str | None = None) -> str:
+        """Return an action's type as "package/Type"; the given one, where one is.
 
         rosapi 2.1 does not tell it: then it is the one of that name, as Nav2 names its actions.
 
@@ -166,15 +187,14 @@ class RosInquiry:
             LinkError: There is no such action, or its type is unknown.
         """
         await self.check_action(action)
+        if given is not None:
+            return bare_type(given)
         try:
             return await self.connection.fetch_action_type(action)
         except LinkError as error:
             found = _find_type_by_name(action)
             if found is None:
-                raise LinkError(
-                    f"The robot does not tell the type of {action}: {error.message}",
-                    hint="Give it as type, as `ros2 action list -t` says on the robot.",
-                ) from error
+                raise UNTOLD_TYPE.error(name=action, why=error.message) from error
             return found
 
     async def check_node(self, node: str) -> None:
@@ -185,43 +205,54 @@ class RosInquiry:
         """
         nodes = await self.connection.fetch_nodes()
         if node not in nodes:
-            raise self.stranger("node", node, nodes)
+            raise refuse_name("node", node, nodes)
 
-    async def describe(self, type_name: str) -> Described:
+    # --- messages
+
+    async def hear(
+        self, topic: str, type_name: str, *, n: int = 1, wait_s: float, duration_s: float = 0.0
+    ) -> Heard:
+        """Listen to a topic of a type, "package/Type"; see `mapspeak.ros.hearing.hear`."""
+        return await hear(
+            self.connection,
+            topic,
+            type_name=await self.say_type(type_name),
+            n=n,
+            wait_s=wait_s,
+            duration_s=duration_s,
+        )
+
+    # --- types
+
+    async def say_type(self, type_name: str, *, kind: str = "msg") -> str:
+        """Return a type as this ROS writes it, such as "nav_msgs/msg/Path"."""
+        dialect = await self.fetch_dialect()
+        package, _, last = bare_type(type_name).partition("/")
+        return f"{package}/{kind}/{last}" if dialect is Dialect.ROS2 else f"{package}/{last}"
+
+    async def describe(self, type_name: str, *, kind: str | None = None) -> Described:
         """Return the definition of a type.
+
+        Args:
+            type_name: However it is written.
+            kind: "msg", "srv" or "action"; None asks for it as it is written.
 
         Raises:
             LinkError: It is not a type's name, or is unknown; says how to describe it.
         """
-        await self._check_type_name(type_name)
-        bare = bare_type(type_name)
-        texts = await self.connection.fetch_definitions(type_name)
+        wanted = type_name if kind is None else await self.say_type(type_name, kind=kind)
+        await self._check_type_name(wanted)
+        bare = bare_type(wanted)
+        texts = await self.connection.fetch_definitions(wanted)
         if not texts:
             # Only the client that taught us knows it.
             texts = self._taught
         parts = find_parts(texts, bare)
         if not parts:
-            raise await self._unknown_type(type_name)
-        return Described(type=bare, parts=parts, book=TypeBook({**self._taught, **texts}))
-
-    async def _unknown_type(self, type_name: str) -> LinkError:
-        graph = self._graph or await self.fetch_graph()
-        package = bare_type(type_name).partition("/")[0]
-        if bare_type(type_name) in kinds_of(known_definitions(graph.dialect)):
-            # Only rclpy leaves out a type that mapspeak could describe: it could not send it.
-            return LinkError(
-                f"Unknown type {type_name}: the ROS on this machine does not have it.",
-                hint=f"Install it: `sudo apt install ros-$ROS_DISTRO-{package.replace('_', '-')}`, "
-                "or source the workspace that has it, and start mapspeak again.",
-            )
-        near = await self._find_types(type_name)
-        meant = f" The nearest that are known: {', '.join(near)}." if near else ""
-        return LinkError(
-            f"Unknown type {type_name}: neither the robot nor mapspeak describes it.{meant}",
-            hint=lead(
-                "Give its definition to {ros_type}, as `ros2 interface show` (ROS 1: `rosmsg "
-                "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts."
-            ),
+            raise await self._unknown_type(wanted)
+        said = await self.say_type(bare, kind=("msg", "srv", "action")[len(parts) - 1])
+        return Described(
+            type=bare, said=said, parts=parts, book=TypeBook({**self._taught, **texts})
         )
 
     async def teach(self, type_name: str, definition: str) -> None:
@@ -233,47 +264,37 @@ class RosInquiry:
         """
         await self._check_type_name(type_name)
         if await self.connection.fetch_definitions(type_name):
-            raise LinkError(
-                f"What a {type_name} looks like is known already.",
-                hint=lead("Call {ros_type} without a definition to see it."),
-            )
+            raise KNOWN_TYPE.error(type=type_name)
         texts = split_parts(type_name, definition)
         for name, text in texts.items():
             await self._check_definition(name, text)
         self._taught |= texts
 
-    async def said(self, type_name: str, *, kind: str = "msg") -> str:
-        """Return a type as this ROS writes it, such as "nav_msgs/msg/Path"."""
-        dialect = await self.fetch_dialect()
-        package, _, last = bare_type(type_name).partition("/")
-        return f"{package}/{kind}/{last}" if dialect is Dialect.ROS2 else f"{package}/{last}"
+    async def _unknown_type(self, type_name: str) -> MapspeakError:
+        graph = self._graph or await self.fetch_graph()
+        bare = bare_type(type_name)
+        if bare in kinds_of(known_definitions(graph.dialect)):
+            # Only rclpy leaves out a type that mapspeak could describe: it could not send it.
+            package = bare.partition("/")[0].replace("_", "-")
+            return NOT_INSTALLED.error(type=type_name, package=package)
+        near = await self._find_types(type_name)
+        meant = f" The nearest that are known: {', '.join(near)}." if near else ""
+        return UNKNOWN_TYPE.error(type=type_name, meant=meant)
 
     async def _check_type_name(self, type_name: str) -> None:
-        if TYPE.fullmatch(type_name):
-            return
-        near = await self._find_types(type_name)
-        meant = f"It may be {', '.join(near)}. " if near else ""
-        raise LinkError(
-            f"{type_name[:80]!r} is no full name of a type.",
-            hint=f"{meant}It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist "
-            "(ROS 1).",
-        )
+        if not TYPE.fullmatch(type_name):
+            near = await self._find_types(type_name)
+            meant = f"It may be {', '.join(near)}. " if near else ""
+            raise NO_TYPE.error(type=type_name[:80], meant=meant)
 
     async def _check_definition(self, name: str, text: str) -> None:
         """Return when every line of a definition is one, and every type within is known."""
         for line in find_odd_lines(text):
-            raise LinkError(
-                f"The definition of {name} has a line that defines nothing: {line[:80]!r}.",
-                hint="A line is a type and a name, as in `float64 x`, or a constant: `uint8 A=1`.",
-            )
+            raise ODD_LINE.error(type=name, line=line[:80])
         fields = parse_definition(name, text).fields
-        for kind in dict.fromkeys(field.type for field in fields if field.is_message):
-            is_known = kind in self._taught or await self.connection.fetch_definitions(kind)
-            if not is_known:
-                raise LinkError(
-                    f"The definition of {name} holds the type {kind}, which nobody knows.",
-                    hint=lead("Give the definition of {kind} to {ros_type} first.", kind=kind),
-                )
+        for within in dict.fromkeys(field.type for field in fields if field.is_message):
+            if within not in self._taught and not await self.connection.fetch_definitions(within):
+                raise UNKNOWN_WITHIN.error(type=name, within=within)
 
     async def _find_types(self, wanted: str) -> list[str]:
         """Return the known types most like a name; first those that end as it does."""
@@ -282,34 +303,8 @@ class RosInquiry:
         kinds = dict.fromkeys(graph.types.values(), "msg") | kinds_of(texts)
         last = f"/{wanted.strip('/').rpartition('/')[2].lower()}"
         ending = sorted(name for name in kinds if name.lower().endswith(last))
-        near = [*ending, *find_nearest(bare_type(wanted), kinds)]
-        nearest = list(dict.fromkeys(near))[:MOST_NEAR]
-        return [await self.said(name, kind=kinds[name]) for name in nearest]
-
-    async def _renew_graph(self) -> RosGraph:
-        await self.connection.wait_until_connected()
-        self._graph = await self.connection.fetch_graph()
-        self._asked_s = self._listed_s = anyio.current_time()
-        return self._graph
-
-    async def _renew_topics(self, graph: RosGraph) -> RosGraph:
-        await self.connection.wait_until_connected()
-        self._graph = replace(graph, types=await self.connection.fetch_topics())
-        self._listed_s = anyio.current_time()
-        return self._graph
-
-    @staticmethod
-    def stranger(what: str, name: str, known: Iterable[str]) -> LinkError:
-        """Return the error for a name that is not there."""
-        names = sorted(known)
-        near = find_nearest(name, names)
-        if not names:
-            return LinkError(f"The robot has no {what}s at all.", hint="Start its ROS nodes.")
-        said = f"The nearest of {len(names)}:" if near else f"There are {len(names)}, such as"
-        return LinkError(
-            f"The robot has no {what} {name[:80]!r}.",
-            hint=f"{said} {', '.join(near or names[:5])}. ros_{what}s lists all.",
-        )
+        near = dict.fromkeys([*ending, *find_nearest(bare_type(wanted), kinds)])
+        return [await self.say_type(name, kind=kinds[name]) for name in list(near)[:MOST_NEAR]]
 
 
 def full_name(name: str) -> str:
@@ -320,9 +315,7 @@ def full_name(name: str) -> str:
     """
     full = f"/{name.strip().strip('/')}"
     if not NAME.fullmatch(full):
-        raise LinkError(
-            f"{name[:80]!r} is no name in ROS.", hint="It looks like /map or /robot1/cmd_vel."
-        )
+        raise NO_NAME.error(name=name[:80])
     return full
 
 
@@ -350,13 +343,4 @@ def require_ros(session: Session, *, toolsets: Iterable[str], tools: Iterable[st
     """
     is_wanted = "ros" in toolsets or any(name.startswith("ros_") for name in tools)
     if is_wanted and session.ros is None:
-        raise ConfigError(
-            f"The ros toolset needs a ROS robot. {NO_ROS}", hint=_say_how_to_get_ros()
-        )
-
-
-def _say_how_to_get_ros() -> str:
-    return (
-        f"`{shell_command('simulate --rosbridge')}` makes the simulated robot one; connect "
-        "to that, or to any other, with --robot ws://HOST:9090."
-    )
+        raise refuse_without_ros(NO_ROS_TOOLS)

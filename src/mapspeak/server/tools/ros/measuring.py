@@ -6,13 +6,16 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.server.tools.ros.census import fetch_publishers
-from mapspeak.server.tools.ros.frames import TRANSFORMS, hear_frames, say_frames, say_transform
-from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
-from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
-from mapspeak.server.tools.ros.reports import cut
+from mapspeak.ros.census import fetch_publishers
+from mapspeak.ros.hearing import hear_frames
+from mapspeak.server.text.ros.frames import say_frames, say_transform
+from mapspeak.server.text.ros.listening import say_measured, say_nodes, say_silence
+from mapspeak.server.text.ros.refusals import refuse_name
+from mapspeak.server.text.ros.values import cut
+from mapspeak.server.tools.ros.goals import RosAccess
+from mapspeak.server.tools.ros.inquiry import full_name
+from mapspeak.server.tools.ros.publishing import TRANSFORMS
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.session import Session
 
 MOST_TOPICS = 20
 
@@ -33,9 +36,9 @@ FramesTopic = Annotated[
 class MeasuringTools:
     """Listening for a time, and counting."""
 
-    def __init__(self, session: Session, inquiry: RosInquiry) -> None:
-        self._session = session
-        self._inquiry = inquiry
+    def __init__(self, ros: RosAccess) -> None:
+        self._session = ros.session
+        self._inquiry = ros.inquiry
 
     @tool("Rates of ROS topics", ToolEffect.READS, leads="{ros_read} shows the messages.")
     async def ros_rates(self, topics: Topics, duration_s: Listen = 3.0) -> str:
@@ -43,19 +46,27 @@ class MeasuringTools:
 
         Use it to find what has died, is slow or late.
         """
-        said: dict[str, str] = {}
+        said = dict.fromkeys(map(full_name, topics), "")
 
         async def measure(name: str) -> None:
             try:
                 said[name] = await self._measure(name, duration_s)
             except LinkError as error:
-                said[name] = f"{name}: {error}"
+                said[name] = str(error)
 
-        names = list(dict.fromkeys(full_name(topic) for topic in topics))
         async with anyio.create_task_group() as tasks:
-            for name in names:
+            for name in said:
                 tasks.start_soon(measure, name)
-        return cut("\n".join([f"listened for {duration_s:g} s", *(said[name] for name in names)]))
+        lines = [f"{name}: {each}" for name, each in said.items()]
+        return cut("\n".join([f"listened for {duration_s:g} s", *lines]))
+
+    async def _measure(self, name: str, duration_s: float) -> str:
+        type_name = await self._inquiry.fetch_topic_type(name)
+        heard = await self._inquiry.hear(name, type_name, wait_s=duration_s, duration_s=duration_s)
+        if heard.n_received:
+            return say_measured(heard, now_s=self._session.robot.now_s)
+        publishers = await fetch_publishers(self._inquiry.connection, name)
+        return f"SILENT, {say_silence(heard)}; published by {say_nodes(publishers)}"
 
     @tool("The tree of TF frames", ToolEffect.READS)
     async def ros_frames(
@@ -68,60 +79,24 @@ class MeasuringTools:
         """Tell the tree of TF frames: each transform's rate and age, static or not, who sends it.
 
         Use it when a transform is missing or late; it names loops, two parents and gaps.
-        With frame: the transform between two frames.
+        With frame: the transform between two frames, and its age.
         """
-        moving = full_name(topic)
-        graph = await self._inquiry.fetch_topics()
-        static = f"{moving}_static"
-        if moving not in graph.types and static not in graph.types:
-            raise self._inquiry.stranger("topic", moving, graph.topics_of(TRANSFORMS))
+        graph, moving = await self._inquiry.fetch_topics(), full_name(topic)
+        there = [name for name in (moving, f"{moving}_static") if name in graph.types]
+        if not there:
+            raise refuse_name("topic", moving, graph.topics_of(TRANSFORMS))
+        connection = self._inquiry.connection
         type_name = graph.dialect.type_name(TRANSFORMS)
-        there = [(name, name == static) for name in (moving, static) if name in graph.types]
-        heard = await hear_frames(
-            self._inquiry.connection,
-            [(name, type_name, is_static) for name, is_static in there],
-            duration_s=duration_s,
-        )
-        if frame is not None:
-            return say_transform(heard.tree, outer=in_frame.strip("/"), inner=frame.strip("/"))
-        senders = [f"{name} published by: {await self._say_senders(name)}" for name, _ in there]
+        heard = await hear_frames(connection, there, type_name=type_name, duration_s=duration_s)
         now_s, heard_s = self._session.robot.now_s, anyio.current_time()
+        if frame is not None:
+            outer, inner = in_frame.strip("/"), frame.strip("/")
+            return say_transform(heard, outer=outer, inner=inner, now_s=now_s, heard_s=heard_s)
         tree = say_frames(list(heard.links.values()), now_s=now_s, heard_s=heard_s)
+        senders = [f"{name} published by: {await self._say_senders(name)}" for name in there]
         return cut("\n".join([f"listened for {duration_s:g} s", *senders, tree]))
 
     async def _say_senders(self, topic: str) -> str:
         publishers = await fetch_publishers(self._inquiry.connection, topic)
-        if len(publishers.others) < 2:
-            return publishers.say()
-        return f"{publishers.say()} (which of them sends which is not told)"
-
-    async def _measure(self, name: str, duration_s: float) -> str:
-        type_name = await self._inquiry.fetch_topic_type(name)
-        heard = await hear(
-            self._inquiry.connection,
-            name,
-            type_name=await self._inquiry.said(type_name),
-            n=1,
-            wait_s=duration_s,
-            duration_s=duration_s,
-        )
-        if not heard.n_received:
-            publishers = await fetch_publishers(self._inquiry.connection, name)
-            return f"{name}: SILENT, {say_silence(heard)}; published by {publishers.say()}"
-        stamp = say_stamp(
-            heard.messages[-1],
-            now_s=self._session.robot.now_s,
-            age_s=heard.age_s,
-            period_s=heard.period_s,
-        )
-        many = "1 message" if heard.n_received == 1 else f"{heard.n_received} messages"
-        rate = f"{say_rate(heard.rate_hz)}, {many}" if heard.n_received > 1 else many
-        stopped = f"; STOPPED, the last {heard.age_s:.1f} s ago" if heard.has_stopped else ""
-        return f"{name}: {rate}{stopped}{f'; {stamp}' if stamp else ''}"
-
-
-def say_silence(heard: Heard) -> str:
-    """Say for how long nothing has come."""
-    if heard.age_s < heard.known_for_s:
-        return f"the last message came {heard.age_s:.1f} s ago"
-    return f"nothing came in the {heard.known_for_s:.1f} s since we listen"
+        is_open = len(publishers.others) > 1
+        return f"{say_nodes(publishers)}{' (which of them sends which is not told)' * is_open}"

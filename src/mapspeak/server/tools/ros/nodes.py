@@ -1,6 +1,6 @@
-"""The tools about nodes and their parameters, and about the system as a whole."""
+"""The tools about nodes and their parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import anyio
@@ -8,42 +8,30 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.port import RosGraph, find_nearest
+from mapspeak.ros.port import find_nearest
 from mapspeak.safety import SetParameter
-from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import list_some
-from mapspeak.server.tools.ros.census import mark_ours
-from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
-from mapspeak.server.tools.ros.reports import (
-    PAGE_SIZE,
-    Filter,
-    Page,
-    cut,
+from mapspeak.server.text.ros.listening import (
+    MOST_NAMED,
     list_page,
+    mark_ours,
     match_names,
-    show_value,
+    page_of,
 )
+from mapspeak.server.text.ros.refusals import (
+    NO_PARAMETER,
+    NO_PARAMETER_TO_DELETE,
+    OTHER_KIND,
+)
+from mapspeak.server.text.ros.values import cut, say_descriptor, show_value
+from mapspeak.server.text.wording import list_some
+from mapspeak.server.tools.ros.goals import RosAccess
+from mapspeak.server.tools.ros.inquiry import full_name
+from mapspeak.server.tools.ros.topics import Filter, Page
 from mapspeak.server.tools.toolset import ToolEffect, tool
 
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8
-MOST_NAMED = 40
-CLOCK = "/clock"
 DESCRIBE = "rcl_interfaces/srv/DescribeParameters"
-KINDS = (
-    "not set", "bool", "integer", "double", "string",
-    "bytes", "bools", "integers", "doubles", "strings",
-)  # fmt: skip
-"""By rcl_interfaces/ParameterType."""
-NOTABLE = {
-    "maps": ("nav_msgs/OccupancyGrid",),
-    "velocities": ("geometry_msgs/Twist", "geometry_msgs/TwistStamped"),
-    "odometry": ("nav_msgs/Odometry",),
-    "scans and clouds": ("sensor_msgs/LaserScan", "sensor_msgs/PointCloud2"),
-    "pictures": ("sensor_msgs/Image", "sensor_msgs/CompressedImage"),
-}
-
 READ_AT_START = "A node of ROS 1 that runs may notice only when it is started again."
 PLAIN = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
 
@@ -58,37 +46,10 @@ Value = Annotated[
 
 
 class NodeTools:
-    """The whole, its nodes, their parameters."""
+    """The nodes, and their parameters."""
 
-    def __init__(self, inquiry: RosInquiry, commands: RosCommands) -> None:
-        self._inquiry = inquiry
-        self._commands = commands
-
-    @tool("The ROS system at a glance", ToolEffect.READS, is_entry=True)
-    async def ros_overview(self) -> str:
-        """Tell which ROS the robot runs and what there is: topics, services, actions, nodes.
-
-        Use it first of the ros_ tools. Which robot it is was chosen by the operator.
-        """
-        graph = await self._inquiry.fetch_graph()
-        connection = self._inquiry.connection
-        nodes, services = await connection.fetch_nodes(), await connection.fetch_services()
-        actions, time_s = await self._inquiry.fetch_actions(), await self._fetch_time_s(graph)
-        number = "1" if graph.dialect is Dialect.ROS1 else "2"
-        lines = [
-            f"ROS {number} {graph.distro}".rstrip()
-            + _say_times(connection.connected_for_s, time_s),
-            f"topics: {len(graph.types)}, services: {len(services)}, nodes: {len(nodes)}",
-            *_say_notable(graph),
-            f"actions: {list_some(actions, most=MOST_NAMED) or 'none'}",
-        ]
-        return cut("\n".join(lines))
-
-    async def _fetch_time_s(self, graph: RosGraph) -> float | None:
-        """Return robot time: that of /clock where there is one, for all nodes go by it then."""
-        if CLOCK in graph.types:
-            return self._inquiry.now_s
-        return await self._inquiry.connection.fetch_time_s()
+    def __init__(self, ros: RosAccess) -> None:
+        self._inquiry = ros.inquiry
 
     @tool("List ROS nodes", ToolEffect.READS, leads="{ros_node} tells what one does.")
     async def ros_nodes(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
@@ -105,18 +66,20 @@ class NodeTools:
 
         Use it to find out who does what.
         """
-        name = full_name(node)
+        name, connection = full_name(node), self._inquiry.connection
         await self._inquiry.check_node(name)
-        links = await self._inquiry.connection.fetch_node(name)
-        own = self._inquiry.connection.own_ends
+        links, own = await connection.fetch_node(name), connection.own_ends
         is_ours = bool(own.node) and name.endswith(f"/{own.node}")
-        published = mark_ours(links.publishes, own.publishes if is_ours else ())
-        heard = mark_ours(links.subscribes, own.hears if is_ours else ())
-        return cut(
-            f"{name}\npublishes: {list_some(published, most=MOST_NAMED) or 'nothing'}\n"
-            f"hears: {list_some(heard, most=MOST_NAMED) or 'nothing'}\n"
-            f"serves: {list_some(links.serves, most=MOST_NAMED) or 'nothing'}"
-        )
+        told = {
+            "publishes": mark_ours(links.publishes, own.publishes if is_ours else ()),
+            "hears": mark_ours(links.subscribes, own.hears if is_ours else ()),
+            "serves": links.serves,
+        }
+        lines = [
+            f"{does}: {list_some(names, most=MOST_NAMED) or 'nothing'}"
+            for does, names in told.items()
+        ]
+        return cut("\n".join([name, *lines]))
 
     @tool("ROS parameters", ToolEffect.READS)
     async def ros_parameters(
@@ -132,8 +95,7 @@ class NodeTools:
         name = _node_name(node)
         names = await self._fetch_names(name)
         chosen = match_names(names, filter)
-        shown = chosen[(page - 1) * PAGE_SIZE : page * PAGE_SIZE]
-        values = await self._fetch_values(name, shown)
+        values = await self._fetch_values(name, page_of(chosen, page))
         notes = await self._describe(name, chosen) if len(chosen) <= MOST_DESCRIBED else {}
         lines = {
             each: f"{each}: {show_value(values.get(each))}{notes.get(each, '')}" for each in chosen
@@ -149,12 +111,13 @@ class NodeTools:
         self, node: ParameterNode, parameter: Parameter, value: Value
     ) -> str:
         """Set or delete a ROS node's parameter, which may change how the robot moves."""
-        name = _node_name(node)
-        self._commands.check_name(SetParameter(node=name, name=parameter, value=value))
+        name, connection = _node_name(node), self._inquiry.connection
+        self._inquiry.check_policy(SetParameter(node=name, name=parameter, value=value))
         if value is None:
-            await self._delete(name, parameter)
+            if await connection.fetch_parameter(name, parameter) is None:
+                raise NO_PARAMETER_TO_DELETE.error(node=name, name=parameter[:80])
+            await connection.set_parameter(name, parameter, None)
             return f"{parameter} of {name} is deleted."
-        connection = self._inquiry.connection
         is_ros1 = await self._inquiry.fetch_dialect() is Dialect.ROS1
         before = await connection.fetch_parameter(name, parameter)
         notes: list[str] = []
@@ -178,26 +141,15 @@ class NodeTools:
         known = await connection.fetch_parameter_names(node)
         if parameter in known:
             return []
-        nodes = await connection.fetch_nodes()
-        if not known and node not in nodes:
-            raise self._inquiry.stranger("node", node, nodes)
+        if not known:
+            await self._inquiry.check_node(node)
         near = find_nearest(parameter, known)
         if is_made:
             like = f": the nearest that it had is {near[0]}" if near else ""
             return [f"It is new{like}."]
-        shown = near or list(known[:5])
-        raise LinkError(
-            f"{node} has no parameter {parameter[:80]!r}.",
-            hint=f"It has {len(known)}, such as {', '.join(shown)}." if shown else "It has none.",
-        )
-
-    async def _delete(self, node: str, parameter: str) -> None:
-        if await self._inquiry.connection.fetch_parameter(node, parameter) is None:
-            raise LinkError(
-                f"{node} has no parameter {parameter[:80]!r}.",
-                hint=lead("{ros_parameters} lists them."),
-            )
-        await self._inquiry.connection.set_parameter(node, parameter, None)
+        shown = ", ".join(near or known[:5])
+        has = f"It has {len(known)}, such as {shown}." if known else "It has none."
+        raise NO_PARAMETER.error(node=node, name=parameter[:80], has=has)
 
     async def _fetch_names(self, node: str) -> tuple[str, ...]:
         try:
@@ -209,7 +161,7 @@ class NodeTools:
             await self._inquiry.check_node(node)
         return names
 
-    async def _fetch_values(self, node: str, names: list[str]) -> dict[str, Any]:
+    async def _fetch_values(self, node: str, names: Sequence[str]) -> dict[str, Any]:
         values: dict[str, Any] = {}
         limiter = anyio.CapacityLimiter(MOST_AT_ONCE)
 
@@ -235,9 +187,9 @@ class NodeTools:
             )
         except MapspeakError:
             return {}  # Neither a node nor a policy has to let us ask.
-        entries = answer.get("descriptors")
-        described = [each for each in entries or [] if isinstance(each, Mapping)]
-        return {str(each.get("name")): _say_descriptor(each) for each in described}
+        entries = answer.get("descriptors") or []
+        described = [each for each in entries if isinstance(each, Mapping)]
+        return {str(each.get("name")): say_descriptor(each) for each in described}
 
 
 def keep_kind(before: object, value: object, *, name: str) -> object:
@@ -248,40 +200,11 @@ def keep_kind(before: object, value: object, *, name: str) -> object:
     """
     if before is None:
         return value
-    kinds = [PLAIN.get(type(each), "a list or a table") for each in (before, value)]
-    if kinds[0] != kinds[1]:
-        raise LinkError(
-            f"{name} is {kinds[0]} ({show_value(before)}), not {kinds[1]}.",
-            hint="Give a value of that kind; to change the kind, delete it first with null.",
-        )
+    old, new = (PLAIN.get(type(each), "a list or a table") for each in (before, value))
+    if old != new:
+        raise OTHER_KIND.error(name=name, old=old, shown=show_value(before), new=new)
     return float(value) if type(before) is float and type(value) is int else value
 
 
 def _node_name(node: str) -> str:
     return "/" if node.strip() == "/" else full_name(node)
-
-
-def _say_times(connected_s: float | None, time_s: float | None) -> str:
-    connected = "" if connected_s is None else f", connected for {connected_s:.0f} s"
-    time = "" if time_s is None else f", robot time {time_s:.1f} s"
-    return f"{connected}{time}."
-
-
-def _say_notable(graph: RosGraph) -> list[str]:
-    found = {what: graph.topics_of(*types) for what, types in NOTABLE.items()}
-    return [
-        f"{what}: {list_some(topics, most=MOST_NAMED)}" for what, topics in found.items() if topics
-    ]
-
-
-def _say_descriptor(entry: Mapping[str, Any]) -> str:
-    kind = entry.get("type")
-    parts = [KINDS[kind]] if isinstance(kind, int) and 0 <= kind < len(KINDS) else []
-    parts += ["read only"] if entry.get("read_only") is True else []
-    for key in ("floating_point_range", "integer_range"):
-        for limits in entry.get(key) or []:
-            if isinstance(limits, Mapping):
-                parts.append(f"{limits.get('from_value')} to {limits.get('to_value')}")
-    texts = (entry.get("description"), entry.get("additional_constraints"))
-    parts += [show_value(text) for text in texts if text]
-    return f" ({', '.join(parts)})" if parts else ""

@@ -1,33 +1,51 @@
-"""The tools about topics: what there is, what it looks like, listening, publishing."""
+"""The tools about the system as a whole and its topics: what there is, listening, publishing."""
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import anyio
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros.census import fetch_hearers, fetch_publishers, take_census
 from mapspeak.ros.definitions.checking import check_message
+from mapspeak.ros.hearing import Heard
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
-from mapspeak.safety import Publish, zero_velocity_of
-from mapspeak.server.text.wording import list_some
-from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
-from mapspeak.server.tools.ros.commands import VELOCITIES, Publisher, PublishRequest, RosCommands
-from mapspeak.server.tools.ros.frames import check_frames
-from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
-from mapspeak.server.tools.ros.measuring import say_silence
-from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
-from mapspeak.server.tools.ros.reports import Filter, Page, cut, list_page, match_names, say_loss
-from mapspeak.server.tools.ros.summaries import MOST_SUMMED, SUMMARIES
-from mapspeak.server.tools.ros.views import MessageView, view_message
+from mapspeak.safety import Publish
+from mapspeak.server.text.ros.listening import (
+    count_nodes,
+    list_page,
+    match_names,
+    say_heard,
+    say_loose_ends,
+    say_loss,
+    say_nodes,
+    say_overview,
+    say_silence,
+    say_stamp,
+)
+from mapspeak.server.text.ros.refusals import (
+    NOTHING_SINCE_LOSS,
+    OTHER_TYPE,
+    SILENT,
+    UNPUBLISHED,
+)
+from mapspeak.server.text.ros.values import cut
+from mapspeak.server.text.ros.views import MOST_SUMMED, TOGETHER, MessageView, view_messages
+from mapspeak.server.tools.ros.goals import RosAccess
+from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, full_name
+from mapspeak.server.tools.ros.publishing import LONGEST_S, PublishRun, check_frames
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.session import Session
 
-LONGEST_S = 25.0
-MOST_NAMED = 20
 VIEWS_KEPT = 4
+GOAL_POSE = "geometry_msgs/PoseStamped"
+CLOCK = "/clock"
 
+Filter = Annotated[
+    str | None,
+    Field(description='part of a name, or a pattern: "scan", "/robot1/*"', max_length=200),
+]
+Page = Annotated[int, Field(description="1 is the first", ge=1, le=1000)]
 Topic = Annotated[str, Field(description="full name, such as /odom", max_length=200)]
 TypeName = Annotated[
     str, Field(description="such as nav_msgs/msg/Odometry or std_srvs/srv/Trigger", max_length=200)
@@ -63,20 +81,29 @@ PublishFor = Annotated[
 Rate = Annotated[float, Field(description="messages a second", ge=0.1, le=50)]
 
 
-GOAL_POSE = "geometry_msgs/PoseStamped"
-
-
 class TopicTools:
-    """Listing, describing, hearing and publishing."""
+    """An overview; listing, describing, hearing and publishing."""
 
-    def __init__(
-        self, session: Session, inquiry: RosInquiry, commands: RosCommands, publisher: Publisher
-    ) -> None:
-        self._session = session
-        self._inquiry = inquiry
-        self._commands = commands
-        self._publisher = publisher
+    def __init__(self, ros: RosAccess) -> None:
+        self._ros = ros
+        self._inquiry = ros.inquiry
         self._viewed: dict[str, tuple[Message, MessageView]] = {}
+
+    @tool("The ROS system at a glance", ToolEffect.READS, is_entry=True)
+    async def ros_overview(self) -> str:
+        """Tell which ROS the robot runs and what there is: topics, services, actions, nodes.
+
+        Use it first of the ros_ tools. Which robot it is was chosen by the operator.
+        """
+        graph, connection = await self._inquiry.fetch_graph(), self._inquiry.connection
+        nodes, services = await connection.fetch_nodes(), await connection.fetch_services()
+        actions = await self._inquiry.fetch_actions()
+        # Where there is a clock, all nodes go by it.
+        has_clock = CLOCK in graph.types
+        time_s = self._ros.session.robot.now_s if has_clock else await connection.fetch_time_s()
+        counts = {"topics": len(graph.types), "services": len(services), "nodes": len(nodes)}
+        up_s = connection.connected_for_s
+        return cut(say_overview(graph, counts, actions, connected_s=up_s, time_s=time_s))
 
     @tool(
         "List ROS topics",
@@ -104,12 +131,12 @@ class TopicTools:
         census = await take_census(connection, await connection.fetch_nodes())
         chosen = match_names(lines, filter)
         counted = {
-            name: f"{lines[name]} published by {census.publishers_of(name).count()}, "
-            f"heard by {census.hearers_of(name).count()}"
+            name: f"{lines[name]} published by {count_nodes(census.publishers_of(name))}, "
+            f"heard by {count_nodes(census.hearers_of(name))}"
             for name in chosen
         }
         text = list_page("topics", counted, None, page, len(lines))
-        return cut("\n".join([text, *_say_loose_ends(census, chosen)]))
+        return cut("\n".join([text, *say_loose_ends(census, chosen)]))
 
     @tool("One ROS topic", ToolEffect.READS, leads="Use it before {ros_publish} too.")
     async def ros_topic(self, topic: Topic) -> str:
@@ -117,14 +144,17 @@ class TopicTools:
 
         Use it when nothing comes.
         """
-        name = full_name(topic)
+        name, connection = full_name(topic), self._inquiry.connection
         type_name = await self._inquiry.fetch_topic_type(name)
-        publishers = await fetch_publishers(self._inquiry.connection, name)
-        hearers = await fetch_hearers(self._inquiry.connection, name)
+        publishers = await fetch_publishers(connection, name)
+        hearers = await fetch_hearers(connection, name)
+        try:
+            fields = (await self._inquiry.describe(type_name, kind="msg")).say()
+        except LinkError as error:
+            fields = str(error)
         return cut(
-            f"{name} {await self._inquiry.said(type_name)}\n"
-            f"published by: {publishers.say()}\nheard by: {hearers.say()}\n"
-            f"{await self._say_fields(type_name)}"
+            f"{name} {await self._inquiry.say_type(type_name)}\n"
+            f"published by: {say_nodes(publishers)}\nheard by: {say_nodes(hearers)}\n{fields}"
         )
 
     @tool(
@@ -140,8 +170,7 @@ class TopicTools:
         if definition is not None:
             await self._inquiry.teach(type, definition)
         described = await self._inquiry.describe(type)
-        said = await self._inquiry.said(described.type, kind=described.kind)
-        return cut(f"{said}\n{described.say()}")
+        return cut(f"{described.said}\n{described.say()}")
 
     @tool("Read a ROS topic", ToolEffect.READS)
     async def ros_read(
@@ -155,24 +184,17 @@ class TopicTools:
         """
         name = full_name(topic)
         type_name = await self._inquiry.fetch_topic_type(name)
-        if duration_s and type_name in SUMMARIES:
+        if duration_s and type_name in TOGETHER:
             n = MOST_SUMMED
         started_s = anyio.current_time()
-        heard = await hear(
-            self._inquiry.connection,
-            name,
-            type_name=await self._inquiry.said(type_name),
-            n=n,
-            wait_s=wait_s,
-            duration_s=duration_s,
-        )
+        heard = await self._inquiry.hear(name, type_name, n=n, wait_s=wait_s, duration_s=duration_s)
         if not heard.messages:
             raise await self._nothing_heard(name, duration_s or wait_s, heard)
         since_s = started_s if duration_s else anyio.current_time() - heard.age_s
         loss = say_loss(self._inquiry.connection, since_s=since_s)
-        head = f"{name} ({await self._inquiry.said(type_name)}): {_say_heard(heard, duration_s)}"
-        head += f"\n{loss}" if loss else ""
-        return await self._show(name, type_name, heard, head)
+        said = await self._inquiry.say_type(type_name)
+        head = f"{name} ({said}): {say_heard(heard, duration_s)}"
+        return await self._show(name, type_name, heard, f"{head}\n{loss}".rstrip())
 
     @tool(
         "Publish on a ROS topic",
@@ -195,132 +217,71 @@ class TopicTools:
         """
         name = full_name(topic)
         known = await self._inquiry.find_topic_type(name)
-        command = Publish(topic=name, type=known or type or "", message=fields)
-        self._commands.check_name(command)
+        self._inquiry.check_policy(Publish(topic=name, type=known or type or "", message=fields))
         type_name = await self._type_to_publish(name, known, type)
-        described = await self._inquiry.describe(await self._inquiry.said(type_name))
-        checked = check_message(described.book, type_name, fields)
+        described = await self._inquiry.describe(type_name, kind="msg")
+        message = check_message(described.book, type_name, fields)
         if type_name == GOAL_POSE or type_name.endswith(ACTION_GOAL):
-            await check_frames(self._inquiry, checked)
-        is_moving = type_name in VELOCITIES and zero_velocity_of(checked) != checked
-        if is_moving and duration_s is None:
-            raise LinkError(
-                f"{name} takes velocities: without an end the robot would go on.",
-                hint=f"Give duration_s, in seconds up to {LONGEST_S:g}.",
-            )
-        said = await self._publisher.publish(
-            PublishRequest(
-                topic=name,
-                type=await self._inquiry.said(type_name),
-                message=checked,
-                is_moving=is_moving,
-                duration_s=duration_s,
-                rate_hz=rate_hz,
-            )
+            await check_frames(self._inquiry, message)
+        wanted = PublishRun(
+            topic=name,
+            type=described.said,
+            message=message,
+            duration_s=duration_s,
+            rate_hz=rate_hz,
         )
-        return f"{said} {await self._say_hearers(name)}"
-
-    async def _say_hearers(self, topic: str) -> str:
+        said = await self._ros.publisher.publish(wanted)
         try:
-            hearers = await fetch_hearers(self._inquiry.connection, topic)
+            hearers = await fetch_hearers(self._inquiry.connection, name)
         except LinkError as error:
-            return f"Who heard it is not known: {error.message}"
-        return f"Heard by: {hearers.say()}."
+            return f"{said} Who heard it is not known: {error.message}"
+        return f"{said} Heard by: {say_nodes(hearers)}."
 
     async def _type_to_publish(self, topic: str, known: str | None, given: str | None) -> str:
         """Return the topic's own type; the one that was given only where there is no topic yet."""
-        if known is None and given is None:
-            return await self._inquiry.fetch_topic_type(topic)
-        if known is None or given is None:
-            return known or bare_type(given or "")
-        if known != bare_type(given):
-            raise LinkError(
-                f"{topic} is a {await self._inquiry.said(known)}, not a {given}.",
-                hint="Leave the type away, and give the fields of its own type.",
+        if given is None:
+            return known or await self._inquiry.fetch_topic_type(topic)
+        if known is not None and known != bare_type(given):
+            raise OTHER_TYPE.error(
+                topic=topic, known=await self._inquiry.say_type(known), given=given
             )
-        return known
+        return bare_type(given)
 
-    async def _say_fields(self, type_name: str) -> str:
-        try:
-            return (await self._inquiry.describe(await self._inquiry.said(type_name))).say()
-        except LinkError as error:
-            return str(error)
-
-    async def _nothing_heard(self, topic: str, waited_s: float, heard: Heard) -> LinkError:
-        loss = say_loss(self._inquiry.connection, since_s=anyio.current_time() - waited_s)
+    async def _nothing_heard(self, topic: str, waited_s: float, heard: Heard) -> MapspeakError:
+        connection = self._inquiry.connection
+        loss = say_loss(connection, since_s=anyio.current_time() - waited_s)
         if loss:
-            return LinkError(
-                f"No message came on {topic} within {waited_s:g} s. {loss}",
-                hint="Read it again once the connection is back.",
-            )
-        publishers = await fetch_publishers(self._inquiry.connection, topic)
+            return NOTHING_SINCE_LOSS.error(topic=topic, waited_s=waited_s, loss=loss)
+        publishers = await fetch_publishers(connection, topic)
         if not publishers.others:
             nobody = "Nobody" if publishers.ours is None else "Nobody but mapspeak"
-            hint = f"{nobody} publishes it: start the node that should."
-        else:
-            hint = (
-                f"It is published by {publishers.say()}, yet {say_silence(heard)}: its node "
-                "may have died or be without data; what speaks seldom needs a larger wait_s."
-            )
-        return LinkError(f"No message came on {topic} within {waited_s:g} s.", hint=hint)
+            return UNPUBLISHED.error(topic=topic, waited_s=waited_s, nobody=nobody)
+        named, silence = say_nodes(publishers), say_silence(heard)
+        return SILENT.error(topic=topic, waited_s=waited_s, publishers=named, silence=silence)
 
     async def _show(self, topic: str, type_name: str, heard: Heard, head: str) -> list[str | Image]:
         """Return the messages with their stamps, and the picture of the latest where it has one."""
-        if summarise := SUMMARIES.get(type_name):
-            return [cut(f"{head}\n{summarise(heard.messages)}")]
-        views = [await self._view(topic, type_name, each) for each in heard.messages]
-        texts = [view.text for view in views]
-        now_s = self._session.robot.now_s
-        stamps = [say_stamp(each, now_s=now_s) for each in heard.messages[:-1]]
-        stamps.append(
-            say_stamp(heard.messages[-1], now_s=now_s, age_s=heard.age_s, period_s=heard.period_s)
-        )
-        texts = [
-            "\n".join(part for part in pair if part) for pair in zip(stamps, texts, strict=True)
-        ]
-        if len(texts) > 1:
-            texts = [f"--- {at} of {len(texts)}\n{text}" for at, text in enumerate(texts, 1)]
-        picture = views[-1].picture
-        text = "\n".join([head, *texts])
-        return [cut(text), *([] if picture is None else [picture])]
+        if type_name in TOGETHER:
+            return [cut(f"{head}\n{view_messages(type_name, *heard.messages).text}")]
+        now_s, latest = self._ros.session.robot.now_s, heard.messages[-1]
+        texts = []
+        for at, message in enumerate(heard.messages, 1):
+            view = await self._view(topic, type_name, message)
+            ages = (heard.age_s, heard.period_s) if message is latest else (0.0, None)
+            stamp = say_stamp(message, now_s=now_s, age_s=ages[0], period_s=ages[1])
+            number = f"--- {at} of {len(heard.messages)}" if len(heard.messages) > 1 else ""
+            texts.append("\n".join(filter(None, (number, stamp, view.text))))
+        text = cut("\n".join([head, *texts]))
+        return [text] if view.picture is None else [text, view.picture]
 
     async def _view(self, topic: str, type_name: str, message: Message) -> MessageView:
         if type_name not in BULKY:
-            return view_message(type_name, message)
-        known = self._viewed.get(topic)
+            return view_messages(type_name, message)
+        known = self._viewed.pop(topic, None)
         if known is None or known[0] is not message:
-            view = await self._session.compute(lambda: view_message(type_name, message))
-            self._viewed.pop(topic, None)
-            self._viewed[topic] = known = (message, view)
-            while len(self._viewed) > VIEWS_KEPT:
-                del self._viewed[next(iter(self._viewed))]
+            view = await self._ros.session.compute(lambda: view_messages(type_name, message))
+            known = (message, view)
+        self._viewed[topic] = known
+        while len(self._viewed) > VIEWS_KEPT:
+            del self._viewed[next(iter(self._viewed))]
         return known[1]
-
-
-def _say_heard(heard: Heard, duration_s: float) -> str:
-    if duration_s:
-        shown = len(heard.messages)
-        stopped = f", the last {heard.age_s:.1f} s ago" if heard.has_stopped else ""
-        return (
-            f"{heard.n_received} messages in {heard.listened_s:.1f} s, "
-            f"{say_rate(heard.rate_hz)}{stopped}; the "
-            f"{'latest' if shown == 1 else f'latest {shown}, the newest last'}:"
-        )
-    many = "" if len(heard.messages) == 1 else f"{len(heard.messages)} messages, the newest "
-    return f"{many}{heard.age_s:.1f} s ago:"
-
-
-def _say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:
-    """Name the topics without a publisher or a subscriber, and the nodes that did not answer."""
-    unsaid = [topic for topic in topics if not census.publishers_of(topic).others]
-    unheard = [topic for topic in topics if census.hearers_of(topic).is_empty]
-    ours = [topic for topic in topics if census.hearers_of(topic).is_ours_alone]
-    lines = [
-        f"published by nobody: {list_some(unsaid, most=MOST_NAMED) or 'none'}",
-        f"heard by nobody: {list_some(unheard, most=MOST_NAMED) or 'none'}",
-    ]
-    if ours:
-        lines.append(f"heard by mapspeak alone: {list_some(ours, most=MOST_NAMED)}")
-    if census.mute:
-        lines.append(f"not counted, they did not answer: {list_some(census.mute, most=MOST_NAMED)}")
-    return lines

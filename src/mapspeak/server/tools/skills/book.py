@@ -1,7 +1,7 @@
 """All skills of one server by their names: built in, the robot's own, its owner's, missions."""
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -160,11 +160,11 @@ class SkillBook:
                 )
             return own
         name, inquiry = full_name(entry.target), self._ros.inquiry
-        fetch = {
+        fetches: dict[Called, Callable[[str], Awaitable[str]]] = {
             Called.SERVICE: inquiry.fetch_service_type,
             Called.ACTION: inquiry.fetch_action_type,
-        }.get(entry.calls, inquiry.fetch_topic_type)
-        type_name = entry.type or await fetch(name)
+        }
+        type_name = entry.type or await fetches.get(entry.calls, inquiry.fetch_topic_type)(name)
         if entry.definition and not await inquiry.connection.fetch_definitions(type_name):
             await inquiry.teach(type_name, entry.definition)
         interface = Interface(InterfaceKind(entry.calls), name, type_name)

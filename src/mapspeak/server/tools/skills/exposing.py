@@ -3,7 +3,6 @@
 import fnmatch
 import logging
 import math
-import re
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
 from functools import partial
@@ -11,13 +10,13 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError, MapspeakError, PolicyError
+from mapspeak.ros.census import fetch_hearers, fetch_publishers
 from mapspeak.ros.messages.fields import bare_type
 from mapspeak.ros.port import RosGraph
 from mapspeak.safety import GuardedConnection
-from mapspeak.server.tools.ros.census import fetch_hearers, fetch_publishers
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import actions_of
-from mapspeak.server.tools.ros.services import FOLDED
+from mapspeak.server.tools.ros.services import find_folded
 from mapspeak.server.tools.skills.board import RESERVED, SkillBoard, name_tool
 from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
 
@@ -178,8 +177,7 @@ class Exposure:
 
 def _is_everybodys(service: str) -> bool:
     """Return True for services that every node has, and for rosapi's and those within actions."""
-    forms = (form for _, form in FOLDED.values())
-    return "/_action/" in service or any(re.fullmatch(form, service) for form in forms)
+    return "/_action/" in service or find_folded(service) is not None
 
 
 def _topics(graph: RosGraph) -> Iterator[tuple[str, str]]:

@@ -7,7 +7,6 @@ from mapspeak.geometry import Point
 from mapspeak.places.naming import find_named
 from mapspeak.server.tools.finding import find_point
 from mapspeak.server.tools.ros.goals import RosAccess
-from mapspeak.server.tools.ros.reading import hear
 from mapspeak.session import Session
 
 BATTERY = "sensor_msgs/BatteryState"
@@ -58,14 +57,7 @@ class SessionFacts:
             topic = next((name for name, kind in topics.items() if kind == BATTERY), None)
             if topic is None:
                 return None
-            heard = await hear(
-                inquiry.connection,
-                topic,
-                type_name=await inquiry.said(BATTERY),
-                n=1,
-                wait_s=HEAR_S,
-                duration_s=0.0,
-            )
+            heard = await inquiry.hear(topic, BATTERY, wait_s=HEAR_S)
         except LinkError:
             return None
         share = heard.messages[0].get("percentage") if heard.messages else None

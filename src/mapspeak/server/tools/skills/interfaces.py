@@ -9,13 +9,11 @@ import anyio
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.activity import ActionState
 from mapspeak.ros.definitions.checking import check_message
-from mapspeak.ros.messages.fields import Message
-from mapspeak.safety import Act, Call, Publish, zero_velocity_of
-from mapspeak.server.tools.ros.commands import VELOCITIES, PublishRequest
-from mapspeak.server.tools.ros.frames import check_frames
+from mapspeak.ros.messages.fields import VELOCITIES, Message
+from mapspeak.safety import Act, Call, Publish
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import Described
-from mapspeak.server.tools.ros.reading import hear
+from mapspeak.server.tools.ros.publishing import PublishRun, check_frames
 from mapspeak.skill import (
     Arguments,
     JsonValue,
@@ -78,7 +76,6 @@ class Interface:
 
 
 LOOK_S = 0.2
-RATE_HZ = 10.0
 DURATION = SkillParameter(
     "for_s",
     ParameterKind.NUMBER,
@@ -113,8 +110,8 @@ class _Opened:
 
     async def call(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Call the service; an answer that reports its own failure is a failure."""
-        type_name = await self.ros.inquiry.said(self.interface.type, kind="srv")
-        self.ros.commands.check_name(
+        type_name = self.described.said
+        self.ros.inquiry.check_policy(
             Call(service=self.interface.name, type=type_name, arguments={})
         )
         request = await self._check(arguments)
@@ -131,9 +128,9 @@ class _Opened:
         """Send a goal and follow it; one that is given up or late is cancelled at its server."""
         n_stops = self.ros.inquiry.connection.started.n_stops
         name, type_name = self.interface.name, self.interface.type
-        self.ros.commands.check_name(Act(action=name, type=type_name, goal={}))
+        self.ros.inquiry.check_policy(Act(action=name, type=type_name, goal={}))
         goal = await self._check(arguments)
-        tracked = await self.ros.goals.send(name, goal, type_name=type_name, n_stops=n_stops)
+        tracked = await self.ros.goals.send(name, goal, described=self.described, n_stops=n_stops)
         try:
             with anyio.move_on_after(self.spec.timeout_s):
                 await self._follow(tracked, on_progress)
@@ -153,30 +150,19 @@ class _Opened:
     async def publish(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Publish once; a velocity for a time, then a stand, also where it is given up."""
         name, kind = self.interface.name, self.interface.type
-        self.ros.commands.check_name(Publish(topic=name, type=kind, message={}))
+        self.ros.inquiry.check_policy(Publish(topic=name, type=kind, message={}))
         message = await self._check(arguments)
-        is_velocity = self.interface.is_velocity
-        request = PublishRequest(
-            topic=name,
-            type=await self.ros.inquiry.said(kind),
-            message=message,
-            is_moving=is_velocity and zero_velocity_of(message) != message,
-            duration_s=float(arguments[DURATION.name]) if is_velocity else None,
-            rate_hz=RATE_HZ,
+        lasts_s = float(arguments[DURATION.name]) if self.interface.is_velocity else None
+        await self.ros.publisher.publish(
+            PublishRun(topic=name, type=self.described.said, message=message, duration_s=lasts_s)
         )
-        await self.ros.publisher.publish(request)
         return succeeded()
 
     async def read(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Read the topic's latest message; wait for one, where none has come yet."""
         check_arguments((), arguments, skill=self.spec.name)
-        heard = await hear(
-            self.ros.inquiry.connection,
-            self.interface.name,
-            type_name=await self.ros.inquiry.said(self.interface.type),
-            n=1,
-            wait_s=self.spec.timeout_s,
-            duration_s=0.0,
+        heard = await self.ros.inquiry.hear(
+            self.interface.name, self.interface.type, wait_s=self.spec.timeout_s
         )
         if not heard.messages:
             return failed(SkillCode.NOT_ANSWERED)
@@ -254,8 +240,7 @@ async def open_interface(
         LinkError: Its type is not described, or cannot be.
     """
     way, reads = WAYS[interface.kind], interface.kind is InterfaceKind.READ
-    type_name = await ros.inquiry.said(interface.type, kind=way.type_kind)
-    described = await ros.inquiry.describe(type_name)
+    described = await ros.inquiry.describe(interface.type, kind=way.type_kind)
     sent = build_layout(described.book, described.parts[0], reserved=reserved)
     parameters = () if reads else sent.parameters
     spec = SkillSpec(

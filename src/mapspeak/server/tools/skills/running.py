@@ -8,10 +8,10 @@ from pydantic import Field
 
 from mapspeak.memory.quoting import clean_line, quote
 from mapspeak.server.text.offered import lead
+from mapspeak.server.text.ros.values import cut, show_message
 from mapspeak.server.text.skills import CODES, GOES_ON, say_conditions, say_waiting
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
-from mapspeak.server.tools.ros.reports import cut, show_message
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import SkillOutcome, SkillState
 from mapspeak.skills.questions import QuestionBook
