@@ -125,9 +125,9 @@ async def serve_live(
     guard = guard or make_guard(folder)
     store = SemanticMapStore(folder / "m.yaml", map_id="two-rooms")
     session = session_type(robot, store, lease_s=60.0, guard=guard, find_model=lambda: None)
-    feed, tokens = ViewFeed(session, CallFeed()), list[str]()
-    server = build_server(session, toolsets=toolsets, call_log=feed.calls)
-    feed.book = server.book
+    calls, tokens = CallFeed(), list[str]()
+    server = build_server(session, toolsets=toolsets, call_log=calls)
+    feed = ViewFeed(session, calls, server.book)
     with anyio.fail_after(PATIENCE_S):
         async with (
             serve_page(

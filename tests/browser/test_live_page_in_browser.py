@@ -80,6 +80,41 @@ async def test_who_has_the_token_releases_checks_and_drives(tmp_path: Path) -> N
     assert len(live.robot.goals) == 1
 
 
+async def test_a_person_answers_a_mission_by_a_button_or_in_words(tmp_path: Path) -> None:
+    tree = f"""
+- look
+- ask: Does the door stand open? {HOSTILE}
+  answers: ['yes', 'no']
+- ask: What is written on it?
+"""
+    toolsets = ("drive", "missions")
+    async with serve_live(tmp_path, toolsets=toolsets) as live, browse(live.address) as page:
+        asked, said = page.locator("#asked"), page.locator("#said")
+        await expect(asked).to_be_hidden()
+        await live.client.call_tool("run_mission", {"tree": tree, "wait_s": 1})
+        await expect(asked).to_contain_text("Does the door stand open? <img")
+        await expect(asked.get_by_role("img")).to_have_js_property("naturalWidth", 64)
+        await asked.get_by_role("button", name="yes").click()
+        await expect(said).to_contain_text("Unlock the page first")
+        await unlock(page, live)
+        await asked.get_by_role("button", name="yes").click()
+        await expect(said).to_have_text("Q1 is answered: yes.")
+        await asked.get_by_label("Answer Q2").last.fill("EXIT 4")
+        await asked.get_by_role("button", name="Answer Q2").click()
+        await expect(said).to_have_text("Q2 is answered: EXIT 4.")
+        await expect(asked).to_be_hidden()
+        await expect(page.locator("#missions")).to_contain_text("Last mission")
+
+
+async def test_a_person_chooses_a_camera(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.cameras = ("front", "rear")
+    async with serve_live(tmp_path, robot) as live, browse(live.address) as page:
+        await page.get_by_label("Which camera").select_option("rear")
+        async with page.expect_request("**/camera?*camera=rear"):
+            await expect(page.locator("#camera")).to_be_visible()
+
+
 async def test_a_click_on_what_lies_there_notes_closes_renames_and_forgets(tmp_path: Path) -> None:
     async with serve_live(tmp_path) as live, browse(live.address) as page:
         await live.client.call_tool("look_at_map", {})
@@ -206,7 +241,7 @@ async def test_a_mission_is_drawn_as_a_tree(tmp_path: Path) -> None:
         await expect(missions).to_contain_text("Mission under way: patrol")
         await expect(missions.locator("li.succeeded")).to_have_text("✓ wait 1 succeeded")
         await expect(missions.locator("li.running")).to_have_text('▶ ask "Is it open?" running')
-        await expect(missions).to_contain_text('Asks Q1: "Is it open?"')
+        await expect(page.locator("#asked")).to_contain_text('Q1: "Is it open?"')
         await live.client.call_tool("answer_mission", {"answer": "yes"})
         await expect(missions).to_contain_text("Last mission: patrol")
         await expect(missions).to_contain_text("Saved mission: patrol")

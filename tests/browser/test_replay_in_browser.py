@@ -20,9 +20,8 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
-from mapspeak.server.view.maplog import MAPS, MapLog
 from mapspeak.server.view.pages import build_replay_page
-from mapspeak.server.view.replay import replay_log
+from mapspeak.server.view.replay import MAPS, MapLog, replay_log
 from mapspeak.server.wire.calllog import CallLog
 from mapspeak.session import Session
 from reportmaking import make_result, make_trial, make_turns, write_course, write_trial

@@ -14,6 +14,8 @@ from mapspeak.cli import cli
 from mapspeak.cli.serving.viewing import make_page
 from mapspeak.errors import MapspeakError
 from mapspeak.memory import SemanticMapStore
+from mapspeak.server.view.calls import CallFeed
+from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import PageKeys, ViewDesk, ViewRequest
 from mapspeak.session import Session
 from reportmaking import make_trial, write_trial
@@ -61,7 +63,7 @@ async def test_a_server_without_a_page_opens_one_for_whoever_asks(tmp_path: Path
     guard = make_guard(tmp_path)
     robot = FakeRobot(two_rooms())
     session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0, guard=guard)
-    page = make_page({"": session}, None, None, tells_token=False)
+    page = make_page({"": ViewFeed(session, CallFeed())}, None, tells_token=False)
     with anyio.fail_after(PATIENCE_S):
         async with anyio.create_task_group() as tasks:
             await tasks.start(page.serve)

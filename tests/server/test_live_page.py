@@ -191,9 +191,41 @@ async def test_a_mission_is_drawn_with_the_state_of_each_step_and_what_it_asks(
         ended = await live.wait_for("missions", "is_over")
     assert asking["latest"]["tree"]["steps"][0]["said"] == "wait 1"
     assert asking["states"] == {"2": "succeeded", "3": "running"}
-    assert "Is it open?" in asking["questions"][0]
+    assert "Is it open?" in asking["questions"][0]["said"]
     assert ended["states"] == {"2": "succeeded", "3": "succeeded", "4": "succeeded"}
     assert [each["name"] for each in ended["saved"]] == ["patrol"]
+
+
+async def test_a_person_answers_what_a_mission_asks_in_their_own_name(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path)
+    tree = "- look\n- ask: Is it open?\n  answers: [open, shut]\n"
+    async with serve_live(tmp_path, guard=guard, toolsets=("drive", "missions")) as live:
+        await live.client.call_tool("run_mission", {"tree": tree, "wait_s": 1})
+        (asked,) = (await live.wait_for("missions", "questions"))["questions"]
+        picture = await live.http.get(f"/robots/robot/{asked['picture']}")
+        answers = {"question": asked["id"], "answer": "open"}
+        locked = await live.command("answer", **answers)
+        await live.unlock("Ada")
+        wrong = await live.command("answer", **{**answers, "answer": "perhaps"})
+        taken = await live.command("answer", **answers)
+        again = await live.command("answer", **answers)
+        ended = await live.wait_for("missions", "is_over")
+        gone = await live.http.get(f"/robots/robot/{asked['picture']}")
+    assert (asked["answers"], picture.headers["content-type"]) == (["open", "shut"], "image/jpeg")
+    assert [each.status_code for each in (locked, wrong, taken, again)] == [403, 409, 200, 409]
+    assert taken.text == "Q1 is answered: open."
+    assert ended["questions"] == []
+    assert gone.status_code == 404
+    (line,) = (each for each in audit_of(tmp_path) if each.event == "answer")
+    assert line.client == "Ada at the live page"
+
+
+async def test_what_no_mission_asks_is_not_answered(tmp_path: Path) -> None:
+    async with serve_live(tmp_path) as live:
+        await live.unlock()
+        answer = await live.command("answer", question="Q7", answer="yes")
+        assert (answer.status_code, "No mission waits" in answer.text) == (409, True)
+        assert (await live.command("answer", question="Q7", answer="")).status_code == 422
 
 
 async def test_the_camera_is_shown_where_there_is_one(tmp_path: Path) -> None:

@@ -13,8 +13,7 @@ from mapspeak.errors import ConfigError, PolicyError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Caller, Publish, calling
 from mapspeak.server.app import build_server
-from mapspeak.server.view.maplog import MAPS, MapLog
-from mapspeak.server.view.replay import replay_log
+from mapspeak.server.view.replay import MAPS, MapLog, replay_log
 from mapspeak.server.wire.calllog import CallLog
 from mapspeak.session import Session
 from served import connect

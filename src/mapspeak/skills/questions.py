@@ -73,13 +73,21 @@ class QuestionBook:
         """Let anyone answer what a client would have been asked: its missions go on without it."""
         self._gone.add(client)
 
-    def find(self, question_id: str | None, *, client: str) -> Question:
+    def find(self, question_id: str | None, *, client: str | None) -> Question:
         """Return a question that waits for a client; the oldest unless one is named.
+
+        Args:
+            client: Its session; None for a person, who may answer every question.
 
         Raises:
             SkillError: None waits for it, or not that one.
         """
-        mine = [each for each in self.waiting if each.client in {"", client, *self._gone}]
+        open_to = {"", client, *self._gone}
+        mine = [
+            each
+            for each in self.waiting
+            if each.answer is None and (client is None or each.client in open_to)
+        ]
         for each in mine:
             if question_id is None or each.id == question_id.strip().upper():
                 return each

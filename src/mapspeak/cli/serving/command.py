@@ -255,7 +255,9 @@ class _Served:
 async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path) -> _Served:
     """Open every robot, and build its server and what draws it."""
     from mapspeak.server.fleet import FleetServer  # noqa: PLC0415
-    from mapspeak.server.view.maplog import MAPS, MapLog  # noqa: PLC0415
+    from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415
+    from mapspeak.server.view.feed import ViewFeed  # noqa: PLC0415
+    from mapspeak.server.view.replay import MAPS, MapLog  # noqa: PLC0415
     from mapspeak.server.wire.calllog import CallLog  # noqa: PLC0415
 
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
@@ -266,10 +268,10 @@ async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path)
     }
     sessions = {name: session for name, (session, _) in opened.items()}
     call_log = None if options.call_log is None else CallLog(options.call_log)
-    page = make_page(sessions, call_log, options.view, tells_token=options.http is not None)
+    calls = {name: CallFeed(call_log) for name in sessions}
     drawers, notes = open_drawing(
         opened,
-        {name: feed.calls for name, feed in page.feeds.items()},
+        calls,
         links,
         has_markers=options.has_markers,
         record=options.record,
@@ -280,12 +282,14 @@ async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path)
     servers = {
         name: _build_server(session, options, notes[name]) for name, session in sessions.items()
     }
-    for name, feed in page.feeds.items():
-        feed.book = servers[name].book
+    feeds = {
+        name: ViewFeed(session, calls[name], servers[name].book)
+        for name, session in sessions.items()
+    }
     return _Served(
         sessions=sessions.values(),
         server=next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers),
-        page=page,
+        page=make_page(feeds, options.view, tells_token=options.http is not None),
         work=(
             *(session.keep_watch for session in sessions.values()),
             *(server.keep_skills for server in servers.values()),

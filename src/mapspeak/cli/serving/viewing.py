@@ -20,8 +20,6 @@ from mapspeak.installation import shell_command
 if TYPE_CHECKING:
     from mapspeak.server.view.feed import ViewFeed
     from mapspeak.server.view.keys import PageKeys, ViewDesk, ViewRequest
-    from mapspeak.server.wire.calllog import CallLog
-    from mapspeak.session import Session
 
 DEFAULT_VIEW = "127.0.0.1:8767"
 VIEW_OPTION = click.option(
@@ -117,30 +115,23 @@ def _find_free(address: str) -> str:
 
 
 def make_page(
-    sessions: "Mapping[str, Session]",
-    call_log: "CallLog | None",
-    address: str | None,
-    *,
-    tells_token: bool,
+    feeds: "Mapping[str, ViewFeed]", address: str | None, *, tells_token: bool
 ) -> LivePage:
     """Return the live page of some robots.
 
     Args:
-        call_log: Where calls are written as well.
         address: Where the page is wanted; None for nowhere yet.
         tells_token: The terminal is a person's own, and no client's log.
     """
-    from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.server.view.feed import ViewFeed  # noqa: PLC0415
-    from mapspeak.server.view.keys import PageKeys, ViewDesk  # noqa: PLC0415
+    from mapspeak.server.view.keys import PageKeys, ViewDesk  # noqa: PLC0415 - heavy; help must be quick
 
     def tell_token(token: str) -> None:
         if address is not None and tells_token:
             click.echo(f"mapspeak: token to command from the live page, once: {token}", err=True)
 
-    guards = [session.guard for session in sessions.values() if session.guard is not None]
+    guards = [feed.session.guard for feed in feeds.values() if feed.session.guard is not None]
     return LivePage(
-        feeds={name: ViewFeed(session, CallFeed(call_log)) for name, session in sessions.items()},
+        feeds=feeds,
         address=address,
         desk=ViewDesk(guards[0].hold.folder if guards else control_folder(None)),
         keys=PageKeys(tell_token),

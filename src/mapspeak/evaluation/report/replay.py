@@ -25,14 +25,16 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.memory import SemanticMap, SemanticMapStore
 from mapspeak.server.view.document import CallView, GridView, PoseView
-from mapspeak.server.view.maplog import MAPS, Moment, read_moments
 from mapspeak.server.view.overlay import Overlay
 from mapspeak.server.view.pages import build_replay_page
 from mapspeak.server.view.replay import (
+    MAPS,
+    Moment,
     Replay,
     StepView,
     join_pictures,
     locate_pictures,
+    read_moments,
     show_map,
     show_moments,
 )

@@ -24,7 +24,7 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.view.maplog import MAPS, MapLog
+from mapspeak.server.view.replay import MAPS, MapLog
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
 from mapspeak.simulator.worlds.worldfiles import write_as_changed

@@ -17,10 +17,9 @@ from mcp_types import Tool as ListedTool
 from pydantic import Field
 
 from mapspeak.errors import MapspeakError
-from mapspeak.server.view.document import GridView
+from mapspeak.server.view.document import GridView, RobotLook
 from mapspeak.server.view.overlay import Overlay
 from mapspeak.server.view.pages import build_chat_page
-from mapspeak.server.view.robotlook import RobotLook
 from mapspeak.session import Session
 
 URI = "ui://mapspeak/map.html"

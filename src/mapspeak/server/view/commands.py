@@ -53,6 +53,13 @@ class WaitingId(CommandBody):
     id: str = Field(max_length=40)
 
 
+class Answering(CommandBody):
+    """A mission's question, by its id, and its answer."""
+
+    question: str = Field(max_length=40)
+    answer: str = Field(min_length=1, max_length=300)
+
+
 class Closing(CommandBody):
     """The id of a closed area, and the end of its closure; empty for an open end."""
 
@@ -115,6 +122,7 @@ class PersonCommands:
             "release": (Nothing, self._release),
             "approve": (WaitingId, self._approve),
             "refuse": (WaitingId, self._refuse),
+            "answer": (Answering, self._answer),
             "check": (MapTarget, self._check),
             "drive": (MapTarget, self._drive),
             "note": (PlaceNote, self._note_place),
@@ -160,6 +168,17 @@ class PersonCommands:
         what = self._require_guard().approvals.fresh_room().refuse(waiting.id)
         self._note("approval", f"refused {waiting.id}: {what}")
         return f"Refused: {what}."
+
+    async def _answer(self, answering: Answering) -> str:
+        book = self._feed.book
+        if book is None:
+            raise GoalError("This robot runs no missions.", hint="Nothing was answered.")
+        question = book.questions.find(answering.question, client=None)
+        taken = book.questions.answer(question, answering.answer)
+        said = f"{question.id} is answered: {taken}."
+        if self._session.guard is not None:
+            self._note("answer", said)
+        return said
 
     async def _check(self, target: MapTarget) -> str:
         world = await self._session.fetch_world_model()

@@ -20,11 +20,12 @@ from mapspeak.server.view.document import (
     GridView,
     MissionsView,
     PoseView,
+    QuestionView,
+    RobotLook,
     RobotView,
     draw_tile,
 )
 from mapspeak.server.view.overlay import Overlay
-from mapspeak.server.view.robotlook import RobotLook
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
@@ -49,15 +50,15 @@ class ViewFeed:
     Attributes:
         robot: Looks at the robot itself.
         people: The names of those who have commanded from a page.
-        book: Of the server's missions; None until it is built.
+        book: Of the missions; None for a robot that runs none.
     """
 
-    def __init__(self, session: Session, calls: CallFeed) -> None:
+    def __init__(self, session: Session, calls: CallFeed, book: SkillBook | None = None) -> None:
         self.session = session
         self.calls = calls
         self.robot = RobotLook(session)
         self.people: set[str] = set()
-        self.book: SkillBook | None = None
+        self.book = book
         self._grids: tuple[tuple[OccupancyGrid, GridView], ...] = ()
         self._drawn: dict[str, bytes] = {}
         self._pages: set[MemoryObjectSendStream[bytes]] = set()
@@ -223,7 +224,16 @@ def _describe_missions(book: SkillBook) -> MissionsView:
         latest=None if course is None else draw_mission(course.mission),
         is_over=course is None or course.is_over,
         states={} if course is None else {n: str(each) for n, each in course.states.items()},
-        questions=tuple(map(say_question, book.questions.waiting)),
+        questions=tuple(
+            QuestionView(
+                id=each.id,
+                said=say_question(each),
+                answers=each.answers,
+                picture="" if each.picture is None else f"questions/{each.id}",
+            )
+            for each in book.questions.waiting
+            if each.answer is None
+        ),
         saved=tuple(draw_mission(each) for each in book.saved.values()),
     )
 

@@ -116,6 +116,7 @@ def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
         Route("/robots/{robot}/tiles/{row:int}/{col:int}/{name}.png", site.show_tile),
         Route("/robots/{robot}/camera", site.show_camera),
         Route("/robots/{robot}/calls/{number:int}/{index:int}", site.show_picture),
+        Route("/robots/{robot}/questions/{question}", site.show_question),
         Route("/unlock", site.unlock, methods=["POST"]),
         Route("/stop-all", site.stop_all, methods=["POST"]),
         Route("/robots/{robot}/{command}", site.command, methods=["POST"]),
@@ -187,6 +188,16 @@ class LiveSite:
         if found is None:
             raise HTTPException(HTTPStatus.NOT_FOUND, "That picture is no longer kept.")
         return Response(found[0], media_type=found[1])
+
+    async def show_question(self, request: Request) -> Response:
+        """Answer with the picture that a waiting question is about."""
+        book = self._find(request).book
+        waiting = () if book is None else book.questions.waiting
+        wanted = request.path_params["question"]
+        picture = next((each.picture for each in waiting if each.id == wanted), None)
+        if picture is None:
+            raise HTTPException(HTTPStatus.NOT_FOUND, "That question waits no longer.")
+        return Response(picture.data, media_type=f"image/{picture.format}")
 
     async def unlock(self, request: Request) -> Response:
         """Give a key for the token that the server's terminal shows."""

@@ -14,6 +14,7 @@ class Commands {
   constructor(base, { robot, isFleet }) {
     this.base = base;
     this.waiting = "";
+    this.asked = "";
     this.fading = 0;
     this.page = Math.random().toString(36).slice(2);
     // A key that `mapspeak view` gave stands behind the #, which no server is sent.
@@ -115,6 +116,22 @@ class Commands {
     byId("waiting").hidden = rows.length === 0;
   }
 
+  /** Ask a person what a mission asks, with its picture.
+   * @param {{id: string, said: string, answers: string[], picture: string}[]} questions */
+  showQuestions(questions) {
+    const ids = questions.map(({ id }) => id).join();
+    if (ids === this.asked) return;
+    this.asked = ids;
+    byId("asked").replaceChildren(...questions.map(({ id, said, answers, picture }) => {
+      const row = document.createElement("div");
+      if (picture) row.append(showPicture(`${this.base}/${picture}`, `What ${id} is about`));
+      row.append(plain(said), ...answers.map((answer) => this.button(answer, "answer", { question: id, answer })));
+      if (!answers.length) row.append(this.form(`Answer ${id}`, "answer", (answer) => ({ question: id, answer }), "an answer"));
+      return row;
+    }));
+    byId("asked").hidden = questions.length === 0;
+  }
+
   /**
    * Return what a person may do where the map was clicked.
    * @param {Click} click
@@ -150,7 +167,7 @@ class Commands {
    */
   button(label, command, body) {
     const button = document.createElement("button");
-    button.textContent = label;
+    button.textContent = legible(label);
     if (!FREE.includes(command)) button.className = "locked";
     button.addEventListener("click", () => this.send(command, body));
     return button;

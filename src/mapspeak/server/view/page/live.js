@@ -43,7 +43,10 @@ async function showLive() {
   on("trail", (data) => map.showTrail(data));
   on("calls", (data) => calls.showAll(data));
   on("call", (data) => calls.show(data));
-  on("missions", (data) => showMissions(byId("missions"), data));
+  on("missions", (data) => {
+    showMissions(byId("missions"), data);
+    commands.showQuestions(data.questions);
+  });
   on("word", (data) => commands.hear(data));
   on("alive", () => {});
   on("robot", (data) => {
@@ -124,7 +127,7 @@ const SIGNS = { running: "▶", succeeded: "✓", failed: "✗", cancelled: "■
 
 /** Draw the latest mission with the state of each leaf, and the saved ones.
  * @param {HTMLElement} list @param {any} told */
-function showMissions(list, { latest, is_over: isOver, states, questions, saved }) {
+function showMissions(list, { latest, is_over: isOver, states, saved }) {
   const tree = (/** @type {any} */ step, /** @type {Record<string, string>} */ known) => {
     const row = document.createElement("li");
     const state = known[step.number];
@@ -146,9 +149,8 @@ function showMissions(list, { latest, is_over: isOver, states, questions, saved 
     details.append(summary, ...plan.remember.map((/** @type {string} */ said) => plain(`Remember: ${said}`)), steps);
     return details;
   };
-  const asked = questions.map((/** @type {string} */ said) => plain(`Asks ${said}`));
   const running = latest ? [part(latest, `${isOver ? "Last mission" : "Mission under way"}: ${latest.name}`, true, states)] : [];
-  list.replaceChildren(...asked, ...running,
+  list.replaceChildren(...running,
     ...saved.map((/** @type {any} */ plan) => part(plan, `Saved mission: ${plan.name}`, false)));
   list.hidden = !list.childElementCount;
 }
