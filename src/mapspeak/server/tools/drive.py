@@ -61,7 +61,7 @@ TurnBy = Annotated[
 ]
 TurnTo = Annotated[
     float | None,
-    Field(description="heading to end with, counter-clockwise from +x", allow_inf_nan=False),
+    Field(description="heading, counter-clockwise from +x", allow_inf_nan=False),
 ]
 NPictures = Annotated[
     int | None,
@@ -220,7 +220,7 @@ class ViewTools:
     async def turn(
         self, context: Context, by_deg: TurnBy = None, to_yaw_deg: TurnTo = None
     ) -> DriveAnswer:
-        """Turn the robot where it stands, by an angle or to a heading, to look another way."""
+        """Turn the robot where it stands, by an angle or to a heading."""
         if (by_deg is None) == (to_yaw_deg is None):
             raise GoalError(
                 "A turn is either by an angle or to a heading.",

@@ -17,8 +17,7 @@ MOST_PLACES = 30
 OnePlace = Annotated[
     str,
     Field(
-        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3", '
-        '"second-smallest room"',
+        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3"',
         max_length=200,
     ),
 ]
