@@ -1,14 +1,15 @@
 """Publishers, subscribers and servers: asked of every node, as ROS has no list of them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.port import NodeLinks, OwnEnds, RosConnection
 
-MOST_AT_ONCE = 8
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,16 +23,6 @@ class Nodes:
 
     others: tuple[str, ...]
     ours: str | None
-
-    @property
-    def is_empty(self) -> bool:
-        """True without any node, ours included."""
-        return not self.others and self.ours is None
-
-    @property
-    def is_ours_alone(self) -> bool:
-        """True when only our node is there."""
-        return not self.others and self.ours is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,24 +52,32 @@ class Census:
 
 async def take_census(connection: RosConnection, nodes: Iterable[str]) -> Census:
     """Ask every node, some at once: one question for each, instead of two for each topic."""
-    links: dict[str, NodeLinks | None] = dict.fromkeys(sorted(nodes))
-    limiter = anyio.CapacityLimiter(MOST_AT_ONCE)
+    told = await ask_each(sorted(nodes), connection.fetch_node)
+    # One may have ended since it was listed.
+    links = {node: each for node, each in told.items() if not isinstance(each, LinkError)}
+    mute = tuple(node for node in told if node not in links)
+    return Census(links=links, mute=mute, own=connection.own_ends)
 
-    async def ask(node: str) -> None:
+
+async def ask_each(
+    names: Iterable[str], ask: Callable[[str], Awaitable[Answer]], *, at_once: int = 8
+) -> dict[str, Answer | LinkError]:
+    """Ask about each of some names, some at once; return each answer, or why there is none."""
+    answers: dict[str, Answer | LinkError] = {}
+    limiter = anyio.CapacityLimiter(at_once)
+    listed = list(dict.fromkeys(names))
+
+    async def ask_one(name: str) -> None:
         async with limiter:
             try:
-                links[node] = await connection.fetch_node(node)
-            except LinkError:
-                return  # It may have ended since it was listed; the answer names it.
+                answers[name] = await ask(name)
+            except LinkError as error:
+                answers[name] = error
 
     async with anyio.create_task_group() as tasks:
-        for node in links:
-            tasks.start_soon(ask, node)
-    return Census(
-        links={node: each for node, each in links.items() if each is not None},
-        mute=tuple(node for node, each in links.items() if each is None),
-        own=connection.own_ends,
-    )
+        for name in listed:
+            tasks.start_soon(ask_one, name)
+    return {name: answers[name] for name in listed}
 
 
 async def fetch_publishers(connection: RosConnection, topic: str) -> Nodes:

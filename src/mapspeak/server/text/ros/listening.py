@@ -143,12 +143,12 @@ def count_nodes(nodes: Nodes) -> str:
 
 def say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:
     """Name the topics without a publisher or a subscriber, and the nodes that did not answer."""
-    publishers = {topic: census.publishers_of(topic) for topic in topics}
-    hearers = {topic: census.hearers_of(topic) for topic in topics}
+    unheard = {each: census.hearers_of(each).ours for each in topics}
+    unheard = {each: ours for each, ours in unheard.items() if not census.hearers_of(each).others}
     told = {
-        "published by nobody": [each for each in topics if not publishers[each].others],
-        "heard by nobody": [each for each in topics if hearers[each].is_empty],
-        "heard by mapspeak alone": [each for each in topics if hearers[each].is_ours_alone],
+        "published by nobody": [each for each in topics if not census.publishers_of(each).others],
+        "heard by nobody": [each for each, ours in unheard.items() if ours is None],
+        "heard by mapspeak alone": [each for each, ours in unheard.items() if ours is not None],
         "not counted, they did not answer": census.mute,
     }
     always = ("published by nobody", "heard by nobody")

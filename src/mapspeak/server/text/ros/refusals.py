@@ -75,16 +75,11 @@ OTHER_TYPE = Refusal(
     "Leave the type away, and give the fields of its own type.",
 )
 
-NOTHING_SINCE_LOSS = Refusal(
-    "No message came on {topic} within {waited_s:g} s. {loss}",
-    "Read it again once the connection is back.",
-)
-UNPUBLISHED = Refusal(
-    "No message came on {topic} within {waited_s:g} s.",
-    "{nobody} publishes it: start the node that should.",
-)
+NOTHING = "No message came on {topic} within {waited_s:g} s."
+LOST_MEANWHILE = Refusal(f"{NOTHING} {{loss}}", "Read it again once the connection is back.")
+UNPUBLISHED = Refusal(NOTHING, "{nobody} publishes it: start the node that should.")
 SILENT = Refusal(
-    "No message came on {topic} within {waited_s:g} s.",
+    NOTHING,
     "It is published by {publishers}, yet {silence}: its node may have died or be without data; "
     "what speaks seldom needs a larger wait_s.",
 )

@@ -7,7 +7,6 @@ from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.definitions.checking import check_message
 from mapspeak.safety import Act
 from mapspeak.server.text.ros.listening import list_page, say_loss
 from mapspeak.server.text.ros.refusals import ONE_OF_BOTH
@@ -93,7 +92,7 @@ class ActionTools:
         self._inquiry.check_policy(Act(action=name, type=type or "", goal=fields))
         type_name = await self._inquiry.fetch_action_type(name, given=type)
         described = await self._inquiry.describe(type_name, kind="action")
-        goal = check_message(described.book, described.parts[0], fields)
+        goal = described.check(fields)
         await check_frames(self._inquiry, goal)
         client = client_of(context)
         job = await self._goals.send(

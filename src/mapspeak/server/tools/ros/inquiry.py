@@ -1,12 +1,13 @@
 """Queries to a ROS system: names checked, types described, the latest graph kept."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import anyio
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.definitions.checking import describe_type
+from mapspeak.ros.definitions.checking import check_message, describe_type
 from mapspeak.ros.definitions.texts import find_parts, kinds_of, known_definitions, split_parts
 from mapspeak.ros.definitions.types import Field, TypeBook, find_odd_lines, parse_definition
 from mapspeak.ros.hearing import Heard, hear
@@ -55,6 +56,14 @@ class Described:
     def answer_fields(self) -> tuple[Field, ...]:
         """The fields of a service's response, or of an action's result."""
         return self.book[self.parts[1]].fields
+
+    def check(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a message, request or goal of this type as it may be sent.
+
+        Raises:
+            LinkError: It does not fit; names the field's path and what its type wants.
+        """
+        return check_message(self.book, self.parts[0], fields)
 
     def say(self) -> str:
         """Return its fields down to the plain values, part by part."""

@@ -1,12 +1,12 @@
 """The tools that measure publications: the rates of topics, and the tree of frames."""
 
+from functools import partial
 from typing import Annotated
 
 import anyio
 from pydantic import Field
 
-from mapspeak.errors import LinkError
-from mapspeak.ros.census import fetch_publishers
+from mapspeak.ros.census import ask_each, fetch_publishers
 from mapspeak.ros.hearing import hear_frames
 from mapspeak.server.text.ros.frames import say_frames, say_transform
 from mapspeak.server.text.ros.listening import say_measured, say_nodes, say_silence
@@ -46,21 +46,12 @@ class MeasuringTools:
 
         Use it to find what has died, is slow or late.
         """
-        said = dict.fromkeys(map(full_name, topics), "")
-
-        async def measure(name: str) -> None:
-            try:
-                said[name] = await self._measure(name, duration_s)
-            except LinkError as error:
-                said[name] = str(error)
-
-        async with anyio.create_task_group() as tasks:
-            for name in said:
-                tasks.start_soon(measure, name)
+        measure = partial(self._measure, duration_s)
+        said = await ask_each(map(full_name, topics), measure, at_once=MOST_TOPICS)
         lines = [f"{name}: {each}" for name, each in said.items()]
         return cut("\n".join([f"listened for {duration_s:g} s", *lines]))
 
-    async def _measure(self, name: str, duration_s: float) -> str:
+    async def _measure(self, duration_s: float, name: str) -> str:
         type_name = await self._inquiry.fetch_topic_type(name)
         heard = await self._inquiry.hear(name, type_name, wait_s=duration_s, duration_s=duration_s)
         if heard.n_received:

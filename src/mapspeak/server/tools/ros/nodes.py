@@ -1,12 +1,13 @@
 """The tools about nodes and their parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
 
-import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros.census import ask_each
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import find_nearest
 from mapspeak.safety import SetParameter
@@ -30,7 +31,6 @@ from mapspeak.server.tools.ros.topics import Filter, Page
 from mapspeak.server.tools.toolset import ToolEffect, tool
 
 MOST_DESCRIBED = 5
-MOST_AT_ONCE = 8
 DESCRIBE = "rcl_interfaces/srv/DescribeParameters"
 READ_AT_START = "A node of ROS 1 that runs may notice only when it is started again."
 PLAIN = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
@@ -95,11 +95,10 @@ class NodeTools:
         name = _node_name(node)
         names = await self._fetch_names(name)
         chosen = match_names(names, filter)
-        values = await self._fetch_values(name, page_of(chosen, page))
+        fetch = partial(self._inquiry.connection.fetch_parameter, name)
+        values = await ask_each(page_of(chosen, page), fetch)
         notes = await self._describe(name, chosen) if len(chosen) <= MOST_DESCRIBED else {}
-        lines = {
-            each: f"{each}: {show_value(values.get(each))}{notes.get(each, '')}" for each in chosen
-        }
+        lines = {each: f"{each}: {_show(values.get(each))}{notes.get(each, '')}" for each in chosen}
         return cut(list_page(f"parameters of {name}", lines, None, page, len(names)))
 
     @tool(
@@ -161,22 +160,6 @@ class NodeTools:
             await self._inquiry.check_node(node)
         return names
 
-    async def _fetch_values(self, node: str, names: Sequence[str]) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        limiter = anyio.CapacityLimiter(MOST_AT_ONCE)
-
-        async def fetch(name: str) -> None:
-            async with limiter:
-                try:
-                    values[name] = await self._inquiry.connection.fetch_parameter(node, name)
-                except LinkError as error:
-                    values[name] = error.message
-
-        async with anyio.create_task_group() as tasks:
-            for name in names:
-                tasks.start_soon(fetch, name)
-        return values
-
     async def _describe(self, node: str, names: list[str]) -> dict[str, str]:
         """Return a ROS 2 node's descriptions of its parameters."""
         if not names or await self._inquiry.fetch_dialect() is Dialect.ROS1:
@@ -204,6 +187,10 @@ def keep_kind(before: object, value: object, *, name: str) -> object:
     if old != new:
         raise OTHER_KIND.error(name=name, old=old, shown=show_value(before), new=new)
     return float(value) if type(before) is float and type(value) is int else value
+
+
+def _show(value: object) -> str:
+    return show_value(value.message if isinstance(value, LinkError) else value)
 
 
 def _node_name(node: str) -> str:

@@ -8,7 +8,6 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.ros.census import find_server
-from mapspeak.ros.definitions.checking import check_message
 from mapspeak.safety import Call
 from mapspeak.server.text.ros.listening import list_page, say_stamp
 from mapspeak.server.text.ros.values import cut, show_message
@@ -93,7 +92,7 @@ class ServiceTools:
         said = await self._inquiry.say_type(type_name, kind="srv")
         self._inquiry.check_policy(Call(service=name, type=said, arguments=fields))
         described = await self._inquiry.describe(said)
-        request = check_message(described.book, described.parts[0], fields)
+        request = described.check(fields)
         answer = await self._inquiry.connection.call_service(
             name, request, type_name=said, timeout_s=timeout_s
         )

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.census import fetch_hearers, fetch_publishers, take_census
-from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.hearing import Heard
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
 from mapspeak.safety import Publish
@@ -25,7 +24,7 @@ from mapspeak.server.text.ros.listening import (
     say_stamp,
 )
 from mapspeak.server.text.ros.refusals import (
-    NOTHING_SINCE_LOSS,
+    LOST_MEANWHILE,
     OTHER_TYPE,
     SILENT,
     UNPUBLISHED,
@@ -220,7 +219,7 @@ class TopicTools:
         self._inquiry.check_policy(Publish(topic=name, type=known or type or "", message=fields))
         type_name = await self._type_to_publish(name, known, type)
         described = await self._inquiry.describe(type_name, kind="msg")
-        message = check_message(described.book, type_name, fields)
+        message = described.check(fields)
         if type_name == GOAL_POSE or type_name.endswith(ACTION_GOAL):
             await check_frames(self._inquiry, message)
         wanted = PublishRun(
@@ -249,15 +248,15 @@ class TopicTools:
 
     async def _nothing_heard(self, topic: str, waited_s: float, heard: Heard) -> MapspeakError:
         connection = self._inquiry.connection
-        loss = say_loss(connection, since_s=anyio.current_time() - waited_s)
-        if loss:
-            return NOTHING_SINCE_LOSS.error(topic=topic, waited_s=waited_s, loss=loss)
+        wait = {"topic": topic, "waited_s": waited_s}
+        if loss := say_loss(connection, since_s=anyio.current_time() - waited_s):
+            return LOST_MEANWHILE.error(**wait, loss=loss)
         publishers = await fetch_publishers(connection, topic)
         if not publishers.others:
             nobody = "Nobody" if publishers.ours is None else "Nobody but mapspeak"
-            return UNPUBLISHED.error(topic=topic, waited_s=waited_s, nobody=nobody)
+            return UNPUBLISHED.error(**wait, nobody=nobody)
         named, silence = say_nodes(publishers), say_silence(heard)
-        return SILENT.error(topic=topic, waited_s=waited_s, publishers=named, silence=silence)
+        return SILENT.error(**wait, publishers=named, silence=silence)
 
     async def _show(self, topic: str, type_name: str, heard: Heard, head: str) -> list[str | Image]:
         """Return the messages with their stamps, and the picture of the latest where it has one."""

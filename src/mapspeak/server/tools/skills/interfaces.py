@@ -8,7 +8,6 @@ import anyio
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.activity import ActionState
-from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.messages.fields import VELOCITIES, Message
 from mapspeak.safety import Act, Call, Publish
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
@@ -178,8 +177,7 @@ class _Opened:
         """
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
         given.pop(DURATION.name, None)
-        book, part = self.described.book, self.described.parts[0]
-        message = check_message(book, part, self.sent.build(given))
+        message = self.described.check(self.sent.build(given))
         if self.interface.kind is not InterfaceKind.SERVICE:
             await check_frames(self.ros.inquiry, message)
         return message
