@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mapspeak.errors import LinkError
+from mapspeak.ros.port import EndQuality
 
 SERVICE_PART = re.compile(r"_(?:Request|Response)$")
 ACTION_PART = re.compile(r"_(?:SendGoal|GetResult)$|_FeedbackMessage$")
@@ -55,19 +56,16 @@ def understand(data: bytes, decode: Decode, *, source_s: float = 0.0) -> Sample:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Endpoint:
+class Endpoint(EndQuality):
     """A reader or a writer in the network.
 
     Attributes:
         key: Its id in the network, which no other has.
         type_name: As "package/kind/Type".
-        is_latched: A late reader gets the last samples ("transient local").
     """
 
     key: bytes
     type_name: str
-    is_reliable: bool
-    is_latched: bool
 
 
 def unknown(name: str) -> LinkError:

@@ -36,7 +36,7 @@ from mapspeak.ros.messages.fields import (
     check_type,
 )
 from mapspeak.ros.patience import Patience
-from mapspeak.ros.port import RosConnection, RosGraph
+from mapspeak.ros.port import RosConnection, RosGraph, TopicQuality
 
 QoS = Any  # a quality of service in each link's own terms
 SEND_GOAL = "/_action/send_goal"
@@ -162,6 +162,11 @@ class NativeLink(RosConnection):
     @abstractmethod
     def distro(self) -> str:
         """Such as "jazzy"; empty where that is unknown."""
+
+    def find_quality(self, topic: str) -> TopicQuality:
+        """Return the quality of service at a topic's ends."""
+        writers, readers = self._writers_of(topic), self._readers_of(topic)
+        return TopicQuality(publishers=tuple(writers), subscribers=tuple(readers))
 
     # --- reading
 

@@ -98,6 +98,27 @@ class OwnEnds:
     hears: frozenset[str] = frozenset()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndQuality:
+    """The quality of service that one end of a topic offers, or asks for.
+
+    Attributes:
+        is_reliable: Lost messages are sent again.
+        is_latched: A late subscriber gets the last messages ("transient local").
+    """
+
+    is_reliable: bool
+    is_latched: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicQuality:
+    """The quality of service of each end of a topic."""
+
+    publishers: tuple[EndQuality, ...]
+    subscribers: tuple[EndQuality, ...]
+
+
 class RosConnection(Advertising, ParameterServices):
     """One ROS system, kept connected. Waiting is limited in wall time; a limit closes nothing.
 
@@ -259,6 +280,10 @@ class RosConnection(Advertising, ParameterServices):
     @abstractmethod
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that listen to a topic."""
+
+    def find_quality(self, topic: str) -> TopicQuality | None:  # noqa: ARG002 - for native links
+        """Return the quality of service at a topic's ends; None where the robot does not say."""
+        return None
 
     @abstractmethod
     async def fetch_services(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ CANCEL_SERVICE_TYPE = re.compile(r"action_msgs/(?:srv/)?CancelGoal")
 HARMLESS = frozenset(
     {
         *("patience", "is_open", "connected_for_s", "lost_for_s", "link", "own_ends", "started"),
-        *("start_soon", "wait_until_connected", "clear_the_way"),
+        *("start_soon", "wait_until_connected", "clear_the_way", "find_quality"),
         *("subscribe", "unsubscribe", "renew", "unadvertise", "advertise_late", "advertise_early"),
         *("fetch_graph", "fetch_topics", "fetch_time_s", "fetch_nodes", "fetch_node"),
         *("fetch_publishers", "fetch_subscribers", "fetch_services", "fetch_service_type"),

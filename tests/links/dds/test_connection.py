@@ -70,6 +70,19 @@ async def test_a_topic_is_read_whether_its_writer_came_before_or_after_us() -> N
         assert await texts.wait_for_more_than(0, timeout_s=5.0) == {"data": "hello"}
 
 
+async def test_the_quality_of_a_topics_ends_is_told() -> None:
+    def prepare(node: DdsNode) -> None:
+        node.advertise("/scan", "sensor_msgs/msg/LaserScan", quality=BEST_EFFORT)
+        node.listen("/scan", "sensor_msgs/msg/LaserScan")
+
+    async with open_both(prepare) as (_, connection):
+        connection.subscribe("/scan")
+        await until(lambda: connection.find_quality("/scan").subscribers)
+        quality = connection.find_quality("/scan")
+    assert [each.is_reliable for each in quality.publishers] == [False]
+    assert [(each.is_reliable, each.is_latched) for each in quality.subscribers] == [(True, False)]
+
+
 async def test_a_writer_that_does_not_repeat_itself_is_heard() -> None:
     async with open_both() as (node, connection):
         node.advertise("/scan", "sensor_msgs/msg/LaserScan", quality=BEST_EFFORT)

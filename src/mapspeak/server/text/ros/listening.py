@@ -3,6 +3,7 @@
 import fnmatch
 import math
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import anyio
@@ -10,7 +11,7 @@ import anyio
 from mapspeak.ros.census import Census, Nodes
 from mapspeak.ros.hearing import Heard
 from mapspeak.ros.messages.fields import Dialect, Message, find_stamp
-from mapspeak.ros.port import RosConnection, RosGraph
+from mapspeak.ros.port import EndQuality, RosConnection, RosGraph, TopicQuality
 from mapspeak.server.text.wording import list_some
 
 LATE_PERIODS = 3.0
@@ -82,13 +83,30 @@ def say_heard(heard: Heard, duration_s: float) -> str:
     return f"{'' if shown == 1 else f'{shown} messages, the newest '}{heard.age_s:.1f} s ago:"
 
 
-def say_measured(heard: Heard, *, now_s: float) -> str:
-    """Say how often messages came, whether they stopped, and the stamp of the latest."""
+def say_measured(heard: Heard, *, now_s: float, n_bytes: int | None) -> str:
+    """Say how often messages came and how much that is, whether they stopped, and the last stamp.
+
+    Args:
+        heard: One message at least.
+        now_s: Robot time.
+        n_bytes: Of the latest on ROS's own wire; None where its type is not described.
+    """
     many = "1 message" if heard.n_received == 1 else f"{heard.n_received} messages"
     rate = f"{say_rate(heard.rate_hz)}, {many}" if heard.n_received > 1 else many
+    rate += f", {_say_size(n_bytes, heard)}"
     stopped = f"; STOPPED, the last {heard.age_s:.1f} s ago" if heard.has_stopped else ""
     stamp = say_stamp(heard.messages[-1], now_s=now_s, age_s=heard.age_s, period_s=heard.period_s)
     return f"{rate}{stopped}{f'; {stamp}' if stamp else ''}"
+
+
+def _say_size(n_bytes: int | None, heard: Heard) -> str:
+    """Say the size of a message, or the bandwidth by that of the latest where a rate is known."""
+    if n_bytes is None:
+        return "bandwidth not known: the type is not described"
+    is_rate = heard.n_received > 1
+    n_kb = n_bytes * (heard.rate_hz if is_rate else 1.0) / 1000.0
+    shown = f"{n_kb / 1000.0:.3g} MB" if n_kb >= 1000.0 else f"{n_kb:.3g} kB"
+    return f"about {shown}{'/s' if is_rate else ''}"
 
 
 def say_silence(heard: Heard) -> str:
@@ -139,6 +157,41 @@ def count_nodes(nodes: Nodes) -> str:
     if nodes.ours is None:
         return str(len(nodes.others) or "nobody")
     return f"{len(nodes.others)} and mapspeak" if nodes.others else "mapspeak alone"
+
+
+def say_quality(quality: TopicQuality | None, dialect: Dialect, link: str) -> list[str]:
+    """Say the quality of service of a topic's ends, and why a subscriber is not served.
+
+    Args:
+        quality: None where it is not told.
+        dialect: ROS 1 has no quality of service.
+        link: The kind of our connection.
+    """
+    if quality is None:
+        is_ros1 = dialect is Dialect.ROS1
+        return [f"QoS: {'ROS 1 has none' if is_ros1 else f'not known: {link} does not tell it'}"]
+    ends = {"published": quality.publishers, "heard": quality.subscribers}
+    said = "; ".join(f"{what} {_say_ends(each)}" for what, each in ends.items())
+    lines = [f"QoS: {said}"]
+    pairs = [(one, other) for one in quality.publishers for other in quality.subscribers]
+    if any(other.is_reliable and not one.is_reliable for one, other in pairs):
+        lines.append("MISMATCH: reliable is wanted, best effort is offered: nothing comes there")
+    if any(other.is_latched and not one.is_latched for one, other in pairs):
+        lines.append(
+            "MISMATCH: transient local is wanted, volatile is offered: nothing comes there"
+        )
+    return lines
+
+
+def _say_ends(ends: Sequence[EndQuality]) -> str:
+    counts = Counter(
+        f"{'reliable' if each.is_reliable else 'best effort'}, "
+        f"{'transient local' if each.is_latched else 'volatile'}"
+        for each in ends
+    )
+    if len(counts) < 2:
+        return next(iter(counts), "by nobody")
+    return " and ".join(f"{said} ({n})" for said, n in sorted(counts.items()))
 
 
 def say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:

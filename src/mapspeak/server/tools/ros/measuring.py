@@ -6,8 +6,11 @@ from typing import Annotated
 import anyio
 from pydantic import Field
 
+from mapspeak.errors import LinkError
 from mapspeak.ros.census import ask_each, fetch_publishers
+from mapspeak.ros.definitions.sizes import measure_message
 from mapspeak.ros.hearing import hear_frames
+from mapspeak.ros.messages.fields import Message
 from mapspeak.server.text.ros.frames import say_frames, say_transform
 from mapspeak.server.text.ros.listening import say_measured, say_nodes, say_silence
 from mapspeak.server.text.ros.refusals import refuse_name
@@ -42,7 +45,7 @@ class MeasuringTools:
 
     @tool("Rates of ROS topics", ToolEffect.READS, leads="{ros_read} shows the messages.")
     async def ros_rates(self, topics: Topics, duration_s: Listen = 3.0) -> str:
-        """Measure several ROS topics at once: rate, age of the stamps, which are silent.
+        """Measure several ROS topics at once: rate, bandwidth, age of stamps, which are silent.
 
         Use it to find what has died, is slow or late.
         """
@@ -55,9 +58,17 @@ class MeasuringTools:
         type_name = await self._inquiry.fetch_topic_type(name)
         heard = await self._inquiry.hear(name, type_name, wait_s=duration_s, duration_s=duration_s)
         if heard.n_received:
-            return say_measured(heard, now_s=self._session.robot.now_s)
+            n_bytes = await self._measure_size(type_name, heard.messages[-1])
+            return say_measured(heard, now_s=self._session.robot.now_s, n_bytes=n_bytes)
         publishers = await fetch_publishers(self._inquiry.connection, name)
         return f"SILENT, {say_silence(heard)}; published by {say_nodes(publishers)}"
+
+    async def _measure_size(self, type_name: str, message: Message) -> int | None:
+        try:
+            described = await self._inquiry.describe(type_name, kind="msg")
+        except LinkError:
+            return None
+        return measure_message(described.book, described.type, message)
 
     @tool("The tree of TF frames", ToolEffect.READS)
     async def ros_frames(

@@ -20,6 +20,7 @@ from mapspeak.server.text.ros.listening import (
     say_loss,
     say_nodes,
     say_overview,
+    say_quality,
     say_silence,
     say_stamp,
 )
@@ -139,7 +140,7 @@ class TopicTools:
 
     @tool("One ROS topic", ToolEffect.READS, leads="Use it before {ros_publish} too.")
     async def ros_topic(self, topic: Topic) -> str:
-        """Tell a ROS topic's type, its fields, who publishes it and who listens.
+        """Tell a ROS topic's type, its fields, who publishes it and who listens, and their QoS.
 
         Use it when nothing comes.
         """
@@ -147,14 +148,20 @@ class TopicTools:
         type_name = await self._inquiry.fetch_topic_type(name)
         publishers = await fetch_publishers(connection, name)
         hearers = await fetch_hearers(connection, name)
+        dialect, link = await self._inquiry.fetch_dialect(), connection.link.kind
+        quality = say_quality(connection.find_quality(name), dialect, link)
         try:
             fields = (await self._inquiry.describe(type_name, kind="msg")).say()
         except LinkError as error:
             fields = str(error)
-        return cut(
-            f"{name} {await self._inquiry.say_type(type_name)}\n"
-            f"published by: {say_nodes(publishers)}\nheard by: {say_nodes(hearers)}\n{fields}"
-        )
+        lines = [
+            f"{name} {await self._inquiry.say_type(type_name)}",
+            f"published by: {say_nodes(publishers)}",
+            f"heard by: {say_nodes(hearers)}",
+            *quality,
+            fields,
+        ]
+        return cut("\n".join(lines))
 
     @tool(
         "What a ROS type looks like",
