@@ -221,6 +221,7 @@ class CauseCode(StrEnum):
     NAVIGATION_AT_AREA = "navigation_at_area"
     VELOCITY_AT_AREA = "velocity_at_area"
     OTHERS_AT_AREA = "others_at_area"
+    NOT_SENT_ON = "not_sent_on"
     NOT_TAKEN = "not_taken"
     REJECTED = "rejected"
     NAVIGATION_LOST = "navigation_lost"

@@ -219,6 +219,42 @@ async def test_a_drive_in_legs_that_is_ended_goes_no_further(tmp_path: Path, how
     assert (await robot.fetch_goal_status(goal_id)).state is GoalState.CANCELLED
 
 
+class LegRefusingRobot(FakeRobot):
+    """Does not take the second leg, and lets a test break the line for stops too."""
+
+    hears_stops = True
+
+    async def send_goal(self, goal: Pose) -> str:
+        if len(self.goals) == 1:
+            raise LinkError("The line is dead.", hint="Wait.")
+        return await super().send_goal(goal)
+
+    async def stop(self) -> None:
+        if not self.hears_stops:
+            raise LinkError("The line is dead.", hint="Wait.")
+        await super().stop()
+
+
+@pytest.mark.parametrize("hears_stops", [True, False])
+async def test_a_drive_whose_next_leg_cannot_be_sent_has_not_arrived_and_goes_no_further(
+    tmp_path: Path,
+    hears_stops: bool,  # noqa: FBT001 - a parameter of pytest
+) -> None:
+    fake = LegRefusingRobot(HALL, pose=WEST)
+    fake.hears_stops = hears_stops
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    goal_id = await robot.send_goal(EAST)
+    with pytest.raises(LinkError):
+        await robot.sleep(30.0)
+    fake.hears_stops = True
+    await robot.sleep(30.0)
+    status = await robot.fetch_goal_status(goal_id)
+    assert (status.state, code_of(status)) == (GoalState.BLOCKED, CauseCode.NOT_SENT_ON)
+    assert "The line is dead" in quote_of(status)
+    assert len(fake.goals) == 1
+    assert fake.pose.x < 5.0
+
+
 class SwervingRobot(FakeRobot):
     """Drives east wherever it is sent."""
 
@@ -703,6 +739,47 @@ async def test_a_stop_before_an_area_that_failed_is_tried_again(tmp_path: Path) 
         await robot.sleep(20.0)
     await robot.watch()
     assert fake.n_stops >= 1
+    assert (await robot.fetch_goal_status(goal_id)).state.is_final
+
+
+async def test_two_reasons_to_stop_at_once_while_no_stop_is_heard_break_no_watch(
+    tmp_path: Path,
+) -> None:
+    class MuteRobot(SwervingRobot):
+        """Hears no stop while a test says so, and takes its time not to."""
+
+        is_mute = True
+
+        async def stop(self) -> None:
+            for _ in range(3):
+                await anyio.lowlevel.checkpoint()
+            if self.is_mute:
+                raise LinkError("The line is dead.", hint="Wait.")
+            await super().stop()
+
+    fake = MuteRobot(HALL, pose=WEST)
+    robot, guard = guarded(fake, tmp_path, Policy(areas=(MIDDLE,))), make_guard(tmp_path)
+    goal_id = await robot.send_goal(EAST)
+    while fake.pose.x < 4.0:
+        await fake.sleep(0.1)
+    await robot.watch()
+    await fake.sleep(0.3)
+    guard.hold.put("a test", at=guard.wall_clock())
+    errors: list[LinkError] = []
+
+    async def look(watch: Callable[[], Awaitable[None]]) -> None:
+        try:
+            await watch()
+        except LinkError as error:
+            errors.append(error)
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(look, robot.obey_hold)
+        tasks.start_soon(look, robot.watch)
+    assert len(errors) == 2
+    assert (await robot.fetch_goal_status(goal_id)).state is GoalState.DRIVING
+    fake.is_mute = False
+    await robot.obey_hold()
     assert (await robot.fetch_goal_status(goal_id)).state.is_final
 
 

@@ -6,9 +6,10 @@ import pytest
 from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
+from mapspeak.errors import LinkError
 from mapspeak.evaluation.agents.driver import read_map_text
 from mapspeak.geometry import Pose
-from mapspeak.robot import Detection
+from mapspeak.robot import CameraPicture, Detection
 from mapspeak.spatial import OccupancyGrid
 from roaming import RoamingRobot, world_from_text
 from served import connect, pictures_of, report_of, text_of
@@ -123,7 +124,9 @@ async def test_a_turn_is_a_drive_in_place(tmp_path: Path) -> None:
     assert to["goal_id"] == "G2"
 
 
-@pytest.mark.parametrize("arguments", [{}, {"by_deg": 90, "to_yaw_deg": 0}])
+@pytest.mark.parametrize(
+    "arguments", [{}, {"by_deg": 90, "to_yaw_deg": 0}, {"by_deg": 270}, {"by_deg": -181}]
+)
 async def test_a_turn_is_by_an_angle_or_to_a_heading(
     tmp_path: Path, arguments: dict[str, object]
 ) -> None:
@@ -187,7 +190,30 @@ async def test_looking_around_ends_when_the_robot_is_stopped(tmp_path: Path) -> 
         result = await client.call_tool("look_around", {"n_pictures": 4})
     assert len(pictures_of(result)) == 1
     assert "No picture at 90 deg and beyond" in text_of(result)
+    assert ".." not in text_of(result)
     assert len(robot.goals) == 1
+
+
+async def test_looking_around_shows_the_pictures_taken_before_the_camera_failed(
+    tmp_path: Path,
+) -> None:
+    class TiredRobot(FakeRobot):
+        """A robot whose camera takes two pictures and no more."""
+
+        n_pictures = 0
+
+        async def fetch_picture(self, camera: str | None = None) -> CameraPicture:
+            self.n_pictures += 1
+            if self.n_pictures > 2:
+                raise LinkError("No picture has come within 5 s.", hint="Check the camera.")
+            return await super().fetch_picture(camera)
+
+    robot = TiredRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("look_around", {"n_pictures": 4})
+    assert not result.is_error
+    assert len(pictures_of(result)) == 2
+    assert "No picture at 180 deg and beyond: No picture has come" in text_of(result)
 
 
 async def test_a_search_shows_a_picture_and_goes_on_by_what_was_seen(tmp_path: Path) -> None:

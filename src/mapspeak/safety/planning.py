@@ -11,7 +11,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
-from mapspeak.robot import Robot
+from mapspeak.robot import GoalStatus, Robot
 from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, read_number, refuse
 from mapspeak.safety.guard import Permit, Surveyor
 from mapspeak.safety.monitor import KEEP_M, GoalMonitor
@@ -148,6 +148,7 @@ class GuardedDrive:
     Attributes:
         goal_id: The id it is known by: that of its first leg.
         leg_id: What the robot calls the leg that it drives now.
+        verdict: Why it was ended here; it counts once the robot has ended its leg.
     """
 
     goal_id: str
@@ -156,6 +157,7 @@ class GuardedDrive:
     leg: Pose
     permit: Permit
     goal_monitor: GoalMonitor
+    verdict: GoalStatus | None = None
 
     @property
     def further_m(self) -> float:
@@ -197,6 +199,11 @@ class Planner:
         self._policy = policy
         self._surveyed_s = -math.inf
 
+    @property
+    def radius_m(self) -> float:
+        """The robot's radius with the clearance that the policy wants."""
+        return self._robot.description.radius_m + self._policy.clearance_m
+
     async def survey_lately(self) -> MapRevision:
         """Return the map of a second of robot time ago at most, or of now."""
         since_s = self._robot.now_s - self._surveyed_s
@@ -208,8 +215,7 @@ class Planner:
     async def survey(self) -> MapRevision:
         """Return the map of now with the areas that are closed now."""
         grid = await self._robot.fetch_map()
-        radius_m = self._robot.description.radius_m + self._policy.clearance_m
-        return await self._surveyor.survey(grid, radius_m=radius_m)
+        return await self._surveyor.survey(grid, radius_m=self.radius_m)
 
     async def plan(self, goal: Pose) -> Plan:
         """Check a goal, and find the legs by which the robot would get there."""

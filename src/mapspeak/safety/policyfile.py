@@ -130,8 +130,8 @@ class _WrittenSpeeds(_Written):
 
 class _WrittenGoals(_Written):
     known_way: bool = True
-    clearance_m: Annotated[float, Field(ge=0, le=5)] = 0.0
-    farthest_m: Annotated[float, Field(gt=0)] = 500.0
+    clearance_m: Annotated[float, Field(ge=0, le=5)] = Policy().clearance_m
+    farthest_m: Annotated[float, Field(gt=0)] = Policy().farthest_m
 
 
 class _WrittenArea(_Written):

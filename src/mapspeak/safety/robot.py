@@ -1,6 +1,7 @@
 """A robot behind the guard: the only one that a session and its tools get."""
 
 import logging
+import math
 from collections import OrderedDict
 from dataclasses import replace
 
@@ -65,7 +66,7 @@ class GuardedRobot:
         self._n_stops = 0
         self._watching = anyio.Lock()
         self._stepping = anyio.Lock()
-        self._seen_at_s = float("-inf")
+        self._seen_at_s = -math.inf
         self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
         self.planner = Planner(robot, surveyor=surveyor, policy=guard.policy)
         self.by_hand = HandDriving(robot, planner=self.planner, surveyor=surveyor)
@@ -74,8 +75,7 @@ class GuardedRobot:
     @property
     def description(self) -> RobotDescription:
         """What is fixed about this robot; its radius includes the clearance that it must keep."""
-        bare = self._robot.description
-        return replace(bare, radius_m=bare.radius_m + self._guard.policy.clearance_m)
+        return replace(self._robot.description, radius_m=self.planner.radius_m)
 
     @property
     def now_s(self) -> float:
@@ -151,6 +151,8 @@ class GuardedRobot:
         drive = self._drive
         if drive is not None and drive.goal_id == robot_goal_id:
             status = await self._follow(drive)
+            if status.state.is_final:
+                status = drive.verdict or status
         else:
             status = await self._robot.fetch_goal_status(robot_goal_id)
         status = self._verdicts.get(robot_goal_id, status)
@@ -170,7 +172,7 @@ class GuardedRobot:
             self._guard.note_event("stop", f"cancelled {robot_goal_id}", robot_s=self.now_s)
 
     async def stop(self) -> None:
-        """End every drive and commands zero velocity, at once; never refused."""
+        """End every drive and command zero velocity, at once; never refused."""
         await self._stop("stopped")
 
     @property
@@ -267,10 +269,17 @@ class GuardedRobot:
         n_stops = self._n_stops
         if self._guard.hold.read() is not None:
             return
-        drive.leg = drive.legs.pop(0)
-        said = f"on to ({drive.leg.x:.2f}, {drive.leg.y:.2f})"
+        leg = drive.legs[0]
+        said = f"on to ({leg.x:.2f}, {leg.y:.2f})"
         self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
-        drive.leg_id = await self._robot.send_goal(drive.leg)
+        try:
+            drive.leg_id = await self._robot.send_goal(leg)
+        except BaseException as error:
+            # Whether the robot took the leg is unknown: it must not drive unnoticed.
+            cause = Cause(code=CauseCode.NOT_SENT_ON, quote=_say_error(error))
+            await self._end(drive, GoalState.BLOCKED, cause)
+            raise
+        drive.leg, drive.legs = leg, drive.legs[1:]
         if n_stops != self._n_stops:
             with anyio.CancelScope(shield=True):
                 await self.stop()
@@ -298,16 +307,12 @@ class GuardedRobot:
 
     async def _end(self, drive: GuardedDrive, state: GoalState, cause: Cause) -> None:
         """Stop the robot and remember why, whatever its navigation will say of the drive."""
-        self._verdicts[drive.goal_id] = GoalStatus(state=state, cause=cause)
+        drive.verdict = drive.verdict or GoalStatus(state=state, cause=cause)
         logger.warning("The robot is stopped: %s.", cause)
         with anyio.CancelScope(shield=True):
-            try:
-                await self._stop(str(cause))
-            except MapspeakError:
-                # It may still drive: the drive must not count as ended, and it is stopped again.
-                del self._verdicts[drive.goal_id]
-                raise
-        self._note_end(drive.goal_id, self._verdicts[drive.goal_id])
+            # If that fails it may still drive: the drive does not count as ended then.
+            await self._stop(str(cause))
+        self._note_end(drive.goal_id, drive.verdict)
 
     async def _stop_for_hold(self, held_by: str) -> None:
         if self._drive is None:
@@ -360,9 +365,9 @@ class GuardedRobot:
     def _give_up_legs(self, drive: GuardedDrive, code: CauseCode) -> None:
         """End a drive that was to go on after its present leg: its end is not the goal."""
         if drive.legs:
-            drive.legs.clear()
+            drive.legs = []
             status = GoalStatus(state=GoalState.CANCELLED, cause=Cause(code=code))
-            self._verdicts.setdefault(drive.goal_id, status)
+            drive.verdict = drive.verdict or status
 
     def _note_replaced(self) -> None:
         if self._drive is not None:

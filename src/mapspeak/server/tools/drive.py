@@ -16,7 +16,7 @@ from mapspeak.places.views.sights import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.robot import DriveAnswer
-from mapspeak.server.text.offered import lead
+from mapspeak.server.text.offered import lead, say_error
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.text.world.descriptions import describe_view
 from mapspeak.server.text.world.drives import not_stopped, say_cause
@@ -57,18 +57,18 @@ OVERLAP_RATIO = 1.1
 """A thing at the edge of one picture is whole in the next."""
 TurnBy = Annotated[
     float | None,
-    Field(description="degrees, left positive", ge=-360, le=360, allow_inf_nan=False),
+    Field(description="degrees, left positive", ge=-180, le=180, allow_inf_nan=False),
 ]
 TurnTo = Annotated[
     float | None,
-    Field(description="heading, counter-clockwise from +x", allow_inf_nan=False),
+    Field(description="heading to end with, counter-clockwise from +x", allow_inf_nan=False),
 ]
 NPictures = Annotated[
     int | None,
     Field(
         description="all around; else as many as leave no gap",
         ge=2,
-        le=12,
+        le=MOST_PICTURES,
         strict=True,
     ),
 ]
@@ -220,7 +220,7 @@ class ViewTools:
     async def turn(
         self, context: Context, by_deg: TurnBy = None, to_yaw_deg: TurnTo = None
     ) -> DriveAnswer:
-        """Turn the robot where it stands, by an angle or to a heading."""
+        """Turn the robot where it stands, by an angle or to a heading, to look another way."""
         if (by_deg is None) == (to_yaw_deg is None):
             raise GoalError(
                 "A turn is either by an angle or to a heading.",
@@ -258,7 +258,10 @@ class ViewTools:
                 await self._session.drives.cancel(report.drive.goal_id)
                 why = say_cause(report.status.cause) or f"the turn is {report.status.state}"
                 return [*shown, _say_rest(yaw_rad, why)]
-            sighting = await look_ahead(self._session, camera)
+            try:
+                sighting = await look_ahead(self._session, camera)
+            except LinkError as error:
+                return [*shown, _say_rest(yaw_rad, say_error(error))]
             shown += [sighting.text, sighting.image]
         return shown
 
@@ -295,4 +298,5 @@ def _count_all_around(picture: CameraPicture) -> int:
 
 def _say_rest(yaw_rad: float, why: str) -> str:
     to_go_on = lead("Call {turn} or {look_around} to go on.")
-    return f"No picture at {math.degrees(yaw_rad):.0f} deg and beyond: {why}. {to_go_on}".rstrip()
+    said = f"No picture at {math.degrees(yaw_rad):.0f} deg and beyond: {why.removesuffix('.')}."
+    return f"{said} {to_go_on}".rstrip()

@@ -17,7 +17,8 @@ MOST_PLACES = 30
 OnePlace = Annotated[
     str,
     Field(
-        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3"',
+        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3", '
+        '"second-smallest room"',
         max_length=200,
     ),
 ]

@@ -3,21 +3,15 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import anyio
 from mcp.server.mcpserver import Image
-from PIL import Image as PictureFile
 from pydantic import Field
 
-from mapspeak.errors import LinkError, SemanticMapError
+from mapspeak.errors import LinkError
 from mapspeak.memory import LaserRing, PictureReading, TakenPicture, build_ring
-from mapspeak.memory.episodes.observation import named_pictures, placed
-from mapspeak.places.recall.undescribed import UndescribedPicture, find_undescribed
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
-from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
@@ -105,51 +99,6 @@ async def look_ahead(session: Session, camera: str | None = None) -> CameraSight
     lines += [] if detector is None else _say_detections(detector, detections)
     lines += [kept.fault] if kept.fault else []
     return CameraSighting(text="\n".join(lines), picture=picture, detections=detections)
-
-
-async def find_taken(session: Session, said: str | None) -> TakenPicture | None:
-    """Return the picture of an id, a name, or an observation, also of an earlier run.
-
-    Raises:
-        SemanticMapError: There is none, or it was taken on a map that lies apart.
-    """
-    taken = None if said is None else session.pictures.find(said)
-    if said is None or taken is not None:
-        return taken
-    store = session.episodes.store
-    seen = await session.compute(lambda: store.get(said.strip()))
-    path = None if seen is None else await session.compute(lambda: store.picture_path(seen))
-    match = None if seen is None else placed(seen, session.memory.place_maps())
-    if seen is None or path is None or match is None or match.is_elsewhere:
-        raise SemanticMapError(
-            f"There is no picture {said[:40]!r} of this map.",
-            hint=lead("Give the id of one, such as P3. {look_through_camera} takes one."),
-        )
-    return session.pictures.find(path.name) or TakenPicture(
-        id=seen.id,
-        name=path.name,
-        pose=match.observation.pose,
-        stamp_s=seen.stamp_s or 0.0,
-        recorded_at=seen.recorded_at,
-        width_px=await session.compute(partial(_measure_width_px, path)),
-        horizontal_fov_rad=None,
-        reported=seen.labels or None,
-    )
-
-
-def _measure_width_px(path: Path) -> int:
-    with PictureFile.open(path) as picture:
-        return picture.width
-
-
-async def find_undescribed_pictures(session: Session) -> tuple[UndescribedPicture, ...]:
-    """Return the kept pictures of this map that nothing was written of, the newest first."""
-
-    def find() -> tuple[UndescribedPicture, ...]:
-        named = named_pictures(session.memory.store.read())
-        return find_undescribed(session.find_reported, session.memory.read(), named=named)
-
-    return await session.compute(find)
 
 
 def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:

@@ -65,6 +65,10 @@ WORDS = {
         "not start was about to drive into it. Find out what drives it: another client's goal, or "
         "velocities of its own."
     ),
+    CauseCode.NOT_SENT_ON: (
+        "The robot went part of the way round what is closed and could not be sent on: it was "
+        "stopped. {quote}"
+    ),
     CauseCode.NOT_TAKEN: (
         "{name} gave no sign of taking the goal within {after_s:g} s: it was withdrawn, and is "
         "cancelled should it be taken later. {check}"
