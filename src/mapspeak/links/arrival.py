@@ -14,7 +14,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.robot import Robot
-from mapspeak.ros.activity import Started
+from mapspeak.ros.activity import News, Started
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot import RosRobot
 
@@ -43,7 +43,7 @@ class Arrival:
         self._open_robot = open_robot
         self.there: RosRobot | None = None
         self._fault: LinkError | None = None
-        self._has_looked = anyio.Event()
+        self._has_looked = News()
         self._is_wanted = anyio.Event()
         self._is_early = False
         # Both ports are large, and every method of them is passed on in the same way.
@@ -105,8 +105,7 @@ class Arrival:
         elif self._fault is None or str(self._fault) != str(fault):
             logger.warning("The robot is not there yet. %s", fault)
         self.there, self._fault = robot, fault
-        has_looked, self._has_looked = self._has_looked, anyio.Event()
-        has_looked.set()
+        self._has_looked.tell()
 
 
 class LatePort:

@@ -8,11 +8,9 @@ from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import Any, Protocol
 
-import anyio
-
 from mapspeak.errors import LinkError
 from mapspeak.links.endpoints import Sample
-from mapspeak.ros.activity import REFUSED, ActionEnd, ActionGoal
+from mapspeak.ros.activity import REFUSED, ActionEnd, ActionGoal, News
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.port import new_id
 
@@ -83,7 +81,7 @@ class ActionWire:
         self._statuses: dict[str, int] = {}
         self._results: list[Answer] = []
         self._server: bytes | None = None
-        self._is_named = anyio.Event()
+        self._named = News()
         result.on_answer = self._take_result
 
     async def send_goal(self, action: str, arguments: Message, *, timeout_s: float) -> ActionGoal:
@@ -128,7 +126,7 @@ class ActionWire:
             if goal_id in self._statuses:
                 self._accept(goal_id)
         self._match_results()
-        self._tell_named()
+        self._named.tell()
 
     def take_feedback(self, message: Message) -> None:
         """Take in the feedback of a goal under way."""
@@ -136,7 +134,7 @@ class ActionWire:
         if goal_id in self._goals:
             self._accept(goal_id)
             self._goals[goal_id].take_feedback(message["feedback"])
-            self._tell_named()
+            self._named.tell()
 
     # --- acceptance
 
@@ -147,9 +145,9 @@ class ActionWire:
             # Silence does not refuse a goal: its sender decides how long to wait.
             return
         if not self._send.tells_whom:
-            with anyio.move_on_after(SECOND_THOUGHT_S):
-                while not goal.is_accepted and goal.id in self._goals:
-                    await self._is_named.wait()
+            await self._named.wait_until(
+                lambda: goal.is_accepted or goal.id not in self._goals, within_s=SECOND_THOUGHT_S
+            )
         if goal.id not in self._goals or goal.is_accepted:
             return
         if answer["accepted"]:
@@ -157,10 +155,6 @@ class ActionWire:
         else:
             del self._goals[goal.id]
             goal.take_end(REFUSED)
-
-    def _tell_named(self) -> None:
-        is_named, self._is_named = self._is_named, anyio.Event()
-        is_named.set()
 
     def _accept(self, goal_id: str) -> None:
         goal = self._goals[goal_id]

@@ -24,6 +24,7 @@ from mapspeak.robot import (
     RobotDescription,
     StampedPose,
 )
+from mapspeak.ros.activity import News
 from mapspeak.simulator import (
     BEAM_ANGLES_RAD,
     BODY_RADIUS_M,
@@ -74,6 +75,7 @@ class SimulatedRobot:
         self._after_step = after_step or _do_nothing
         self._turn = anyio.Lock()
         self._looking = anyio.Lock()
+        self._moved_on = News()
 
     @property
     def description(self) -> RobotDescription:
@@ -202,16 +204,6 @@ class SimulatedRobot:
 class PacedRobot(SimulatedRobot):
     """The same robot, whose time passes as the wall clock's does while `keep_pace` runs."""
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        *,
-        has_detector: bool,
-        after_step: Callable[[], None] | None = None,
-    ) -> None:
-        super().__init__(simulation, has_detector=has_detector, after_step=after_step)
-        self._moved_on = anyio.Event()
-
     async def sleep(self, duration_s: float) -> None:
         """Return when that much robot time has passed."""
         deadline_s = self.now_s + duration_s
@@ -224,8 +216,7 @@ class PacedRobot(SimulatedRobot):
         while True:
             due_s = robot_s + anyio.current_time() - wall_s
             await self.advance_to(min(due_s, self.now_s + CHUNK_S))
-            self._moved_on.set()
-            self._moved_on = anyio.Event()
+            self._moved_on.tell()
             if due_s - self.now_s > LATE_S:
                 wall_s, robot_s = anyio.current_time(), self.now_s
             await anyio.sleep(TICK_S)

@@ -13,6 +13,29 @@ from mapspeak.ros.messages.fields import Message
 Listener = Callable[[Message], None]
 
 
+class News:
+    """Wakes all who wait, each time that something is told."""
+
+    def __init__(self) -> None:
+        self._told = anyio.Event()
+
+    def tell(self) -> None:
+        """Wake all who wait."""
+        told, self._told = self._told, anyio.Event()
+        told.set()
+
+    async def wait(self) -> None:
+        """Return when something is told the next time."""
+        await self._told.wait()
+
+    async def wait_until(self, is_so: Callable[[], bool], *, within_s: float) -> bool:
+        """Wait until a condition is true or the time is over; return whether it is true."""
+        with anyio.move_on_after(within_s):
+            while not is_so():
+                await self.wait()
+        return is_so()
+
+
 class Subscription:
     """The latest message of one topic. Many may wait for the next one at once.
 
@@ -38,7 +61,7 @@ class Subscription:
         self.n_users = self.n_renewals = 0
         self.reader: Any = None
         self._listeners: list[Listener] = []
-        self._news = anyio.Event()
+        self._news = News()
 
     def listen(self, listener: Listener) -> None:
         """Call a function with every message that comes from now on; it must not raise."""
@@ -51,8 +74,7 @@ class Subscription:
         self.arrived_s = anyio.current_time()
         for listener in self._listeners:
             listener(message)
-        news, self._news = self._news, anyio.Event()
-        news.set()
+        self._news.tell()
 
     async def wait_for_more_than(self, n_received: int, *, timeout_s: float) -> Message:
         """Return the latest message once more than a number have come; wait in wall time.
@@ -60,10 +82,10 @@ class Subscription:
         Raises:
             LinkError: None came in time. The subscription goes on.
         """
-        with anyio.move_on_after(timeout_s):
-            while self.n_received <= n_received:
-                await self._news.wait()
-        if self.n_received <= n_received or self.latest is None:
+        has_more = await self._news.wait_until(
+            lambda: self.n_received > n_received, within_s=timeout_s
+        )
+        if not has_more or self.latest is None:
             raise LinkError(
                 f"No message came on {self.topic} within {timeout_s:g} s.",
                 hint=f"Check that somebody publishes it: `ros2 topic hz {self.topic}` "
@@ -169,7 +191,7 @@ class ActionGoal:
         self.n_lists_at_loss: int | None = None
         self.n_lists_at_end = 0
         self._listeners: list[Callable[[], None]] = []
-        self._news = anyio.Event()
+        self._news = News()
 
     # --- news from the connection
 
@@ -212,7 +234,7 @@ class ActionGoal:
         """Note how it stands now; a goal does not go back."""
         if not self.is_over and ORDER.index(state) > ORDER.index(self.state):
             self.state = state
-            self._tell()
+            self._news.tell()
 
     def count_feedback(self) -> None:
         """Note that the latest feedback is new, and says that the goal is being pursued."""
@@ -231,16 +253,12 @@ class ActionGoal:
         if not self.is_over:
             self.state, self.reason = state, " ".join(reason.split())[:LONGEST_REASON]
             self.ended_s = anyio.current_time()
-            self._tell()
+            self._news.tell()
 
     def settle(self) -> None:
         """Note that the server has ended a withdrawn goal."""
         self.is_settled = True
-        self._tell()
-
-    def _tell(self) -> None:
-        news, self._news = self._news, anyio.Event()
-        news.set()
+        self._news.tell()
 
     async def wait_until_over(self, *, within_s: float) -> bool:
         """Wait for its end until the time is over; return True at its end."""
@@ -248,10 +266,7 @@ class ActionGoal:
 
     async def wait_until(self, is_so: Callable[[], bool], *, within_s: float) -> bool:
         """Wait until a condition is true of it or the time is over; return whether it is true."""
-        with anyio.move_on_after(within_s):
-            while not is_so():
-                await self._news.wait()
-        return is_so()
+        return await self._news.wait_until(is_so, within_s=within_s)
 
 
 class Startable(Protocol):

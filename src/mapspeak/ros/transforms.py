@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import StampedPose
-from mapspeak.ros.activity import Subscription
+from mapspeak.ros.activity import News, Subscription
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import FrameTransform, read_transforms
 from mapspeak.ros.port import RosConnection
@@ -161,7 +161,8 @@ class FrameListener:
         """Messages that were no transforms."""
         self._connection = connection
         self._subscriptions: dict[str, Subscription] = {}
-        self._news = anyio.Event()
+        self.news = News()
+        """Told of each message."""
 
     def listen(self, moving_topic: str, static_topic: str, *, dialect: Dialect) -> None:
         """Subscribe to both topics, also before anybody publishes them, and to no others."""
@@ -186,10 +187,6 @@ class FrameListener:
             return False
         return True
 
-    async def wait_for_news(self) -> None:
-        """Return after the next message."""
-        await self._news.wait()
-
     def _take(self, message: Message, *, is_static: bool) -> None:
         try:
             transforms = read_transforms(message)
@@ -198,5 +195,4 @@ class FrameListener:
             return
         if self.tree.take(transforms, is_static=is_static) and not is_static:
             self.arrived_s = anyio.current_time()
-        news, self._news = self._news, anyio.Event()
-        news.set()
+        self.news.tell()

@@ -133,7 +133,7 @@ class DdsConnection(NativeLink):
             is_news = True
             while is_news:
                 with anyio.move_on_after(QUIET_S) as quiet:
-                    await self.discovery.wait_for_news()
+                    await self.discovery.news.wait()
                 is_news = not quiet.cancelled_caught
 
     async def aclose(self) -> None:
@@ -144,10 +144,9 @@ class DdsConnection(NativeLink):
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when a node is there again."""
-        with anyio.move_on_after(FIRST_SIGN_S):
-            while self.discovery.is_empty:
-                await self.discovery.wait_for_news()
-        if self.discovery.is_empty:
+        if not await self.discovery.news.wait_until(
+            lambda: not self.discovery.is_empty, within_s=FIRST_SIGN_S
+        ):
             raise LinkError(
                 f"No node of ROS 2 was found in DDS domain {self.network.domain_id} within "
                 f"{FIRST_SIGN_S:g} s.",
@@ -234,11 +233,13 @@ class DdsConnection(NativeLink):
 
         Who serves it is found by its answers; what it takes is told by who reads the requests.
         """
-        with anyio.move_on_after(within_s):
-            while self.discovery.server_of(service) is None:
-                await self.discovery.wait_for_news()
-            while not self.discovery.readers_of(request_topic(service)):
-                await self.discovery.wait_for_news()
+        await self.discovery.news.wait_until(
+            lambda: (
+                self.discovery.server_of(service) is not None
+                and bool(self.discovery.readers_of(request_topic(service)))
+            ),
+            within_s=within_s,
+        )
         server = self.discovery.server_of(service)
         if server is None:
             raise nobody_serves(service)

@@ -7,7 +7,6 @@ from enum import Enum, auto
 from typing import Any
 from uuid import UUID
 
-import anyio
 from cyclonedds.core import InstanceState
 from cyclonedds.qos import Policy
 
@@ -18,6 +17,7 @@ from mapspeak.links.dds.endpoints import (
     topic_of,
 )
 from mapspeak.links.endpoints import Endpoint, Sample, is_hidden, whole_type
+from mapspeak.ros.activity import News
 from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.ros.port import NodeLinks
 
@@ -72,7 +72,8 @@ class Discovery:
         self._writers: dict[bytes, DdsEndpoint] = {}
         self._readers: dict[bytes, DdsEndpoint] = {}
         self._nodes: dict[bytes, dict[str, tuple[bytes, ...]]] = {}
-        self._news = anyio.Event()
+        self.news = News()
+        """Told when a participant has come or gone."""
         self.has_long_ids = False
         """True for Humble and before."""
 
@@ -111,12 +112,7 @@ class Discovery:
 
     def _tell(self, topic: str) -> None:
         self._on_change(topic)
-        news, self._news = self._news, anyio.Event()
-        news.set()
-
-    async def wait_for_news(self) -> None:
-        """Return when a participant has come or gone."""
-        await self._news.wait()
+        self.news.tell()
 
     # --- the known graph
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import anyio
 from cyclonedds.core import DDSException, InstanceState, ReadCondition, SampleState, ViewState
 from cyclonedds.idl import IdlStruct
 from cyclonedds.pub import DataWriter
@@ -13,6 +12,7 @@ from cyclonedds.sub import DataReader
 
 from mapspeak.errors import LinkError
 from mapspeak.links.endpoints import Decode, Sample, Take, full_type, understand
+from mapspeak.ros.activity import News
 
 TOPIC, REQUEST, REPLY = "rt", "rq", "rr"
 DISCOVERY_TOPIC = "ros_discovery_info"
@@ -192,7 +192,7 @@ class RawWriter:
         self.writer: DataWriter[Any] | None = writer
         self._raw_type = raw_type
         self.n_matched = 0
-        self._news = anyio.Event()
+        self._news = News()
 
     def write(self, data: bytes) -> None:
         """Send the bytes of one message."""
@@ -212,12 +212,8 @@ class RawWriter:
     def note_matched(self, n_matched: int) -> None:
         """Take in how many readers there are."""
         self.n_matched = n_matched
-        news, self._news = self._news, anyio.Event()
-        news.set()
+        self._news.tell()
 
     async def wait_for_reader(self, *, timeout_s: float) -> bool:
         """Wait for a reader until the time is over; return whether there is one."""
-        with anyio.move_on_after(timeout_s):
-            while not self.n_matched:
-                await self._news.wait()
-        return self.n_matched > 0
+        return await self._news.wait_until(lambda: self.n_matched > 0, within_s=timeout_s)

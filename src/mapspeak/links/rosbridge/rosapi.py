@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from mapspeak.errors import LinkError
+from mapspeak.links.endpoints import unknown
 from mapspeak.ros.definitions.texts import (
     KINDS,
     find_actions_of_ros1,
@@ -136,7 +138,8 @@ class Rosapi(RosConnection):
         dialect, distro = await self._fetch_version(list(listed.values()))
         actions: tuple[str, ...] = ()
         if dialect is Dialect.ROS2:
-            actions = await self._fetch_actions()
+            with suppress(LinkError):
+                actions = await self._list("action_servers")
         return RosGraph(
             dialect=dialect,
             distro=distro,
@@ -174,7 +177,7 @@ class Rosapi(RosConnection):
 
     async def fetch_nodes(self) -> tuple[str, ...]:
         """Return the full names of all nodes."""
-        return tuple(sorted(_texts(await self.call_service("/rosapi/nodes"), "nodes")))
+        return await self._list("nodes")
 
     async def fetch_node(self, node: str) -> NodeLinks:
         """Return the topics and services that a node publishes, subscribes to and serves."""
@@ -187,17 +190,15 @@ class Rosapi(RosConnection):
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish on a topic."""
-        answer = await self.call_service("/rosapi/publishers", {"topic": topic})
-        return tuple(sorted(_texts(answer, "publishers")))
+        return await self._list("publishers", topic=topic)
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that listen to a topic."""
-        answer = await self.call_service("/rosapi/subscribers", {"topic": topic})
-        return tuple(sorted(_texts(answer, "subscribers")))
+        return await self._list("subscribers", topic=topic)
 
     async def fetch_services(self) -> tuple[str, ...]:
         """Return the full names of all services."""
-        return tuple(sorted(_texts(await self.call_service("/rosapi/services"), "services")))
+        return await self._list("services")
 
     async def fetch_service_type(self, service: str) -> str:
         """Return a service's type."""
@@ -277,20 +278,15 @@ class Rosapi(RosConnection):
             answer.get("distro", "")
         )
 
-    async def _fetch_actions(self) -> tuple[str, ...]:
-        try:
-            answer = await self.call_service("/rosapi/action_servers")
-        except LinkError:
-            return ()
-        return tuple(sorted(_texts(answer, "action_servers")))
+    async def _list(self, kind: str, **asked: str) -> tuple[str, ...]:
+        """Return the names that the service of rosapi called so lists."""
+        return tuple(sorted(_texts(await self.call_service(f"/rosapi/{kind}", asked), kind)))
 
 
 def _type_of(answer: Mapping[str, Any], name: str) -> str:
     type_name = answer.get("type")
     if not isinstance(type_name, str) or "/" not in type_name:
-        raise LinkError(
-            f"The robot knows no {name[:80]}.", hint="Ask for the list of what there is first."
-        )
+        raise unknown(name)
     return bare_type(type_name)
 
 

@@ -38,32 +38,6 @@ Fields = dict[str, Any]
 """Of a `RobotProfile`, by their names."""
 
 
-@dataclass(frozen=True, slots=True)
-class Nearness:
-    """Prefers topics of one robot among several, and those that are served.
-
-    Attributes:
-        namespace: Such as /robot1; empty for none.
-        dead: Topics known to exist by name only.
-    """
-
-    namespace: str
-    dead: frozenset[str] = frozenset()
-
-    def first(self, names: Iterable[str]) -> str | None:
-        """Return the first of the names that lies in the namespace, else the first."""
-        listed = list(names)
-        return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
-
-    def has(self, name: str) -> bool:
-        """Return True for a served topic of the robot; without a namespace, of any."""
-        return name not in self.dead and (not self.namespace or self._is_near(name))
-
-    def _is_near(self, name: str) -> bool:
-        prefix = self.namespace.strip("/")
-        return bool(prefix) and name.strip("/").startswith(f"{prefix}/")
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
     """The types that a topic may have, and its usual names.
@@ -151,7 +125,7 @@ def choose_profile(
     Topics known to exist by name only are `dead`; `services` are None where they are not known.
     """
     namespace, others = _choose_namespace(overrides, find_namespaces(graph, dead))
-    choice = _Choice(graph, overrides, frames, Nearness(namespace, dead))
+    choice = _Choice(graph, overrides, frames, namespace=namespace, dead=dead)
     navigation = choice.navigation(services)
     return RobotProfile(
         name=overrides.name or namespace.strip("/") or "robot",
@@ -207,31 +181,48 @@ class _Choice:
 
     Args:
         said: By robot.yaml.
-        near: The robot to prefer among several.
+        namespace: Of the robot to prefer among several, such as /robot1; empty for none.
+        dead: Topics known to exist by name only.
     """
 
     def __init__(
-        self, graph: RosGraph, said: RobotOverrides, frames: frozenset[str], near: Nearness
+        self,
+        graph: RosGraph,
+        said: RobotOverrides,
+        frames: frozenset[str],
+        *,
+        namespace: str,
+        dead: frozenset[str],
     ) -> None:
         self._graph = graph
         self._said = said
         self._frames = frames
-        self._near = near
+        self._namespace = namespace
+        self._dead = dead
 
     def best(self, wanted: Wanted) -> str | None:
-        return self._near.first(self._rank(wanted))
+        return self._first(self._rank(wanted))
 
     def _rank(self, wanted: Wanted) -> list[str]:
         return sorted(
             (topic for topic in self._graph.topics_of(*wanted.types) if _may_be(topic, wanted)),
             key=lambda topic: (
-                topic in self._near.dead,
+                topic in self._dead,
                 _place_of(topic, wanted),
                 wanted.types.index(self._graph.types[topic]),
                 topic.count("/"),
                 topic,
             ),
         )
+
+    def _first(self, names: Iterable[str]) -> str | None:
+        """Return the first of the names that lies in the namespace, else the first."""
+        listed = list(names)
+        return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
+
+    def _is_near(self, name: str) -> bool:
+        prefix = self._namespace.strip("/")
+        return bool(prefix) and name.strip("/").startswith(f"{prefix}/")
 
     def listed(self, topic: str) -> str | None:
         return topic if topic in self._graph.types else None
@@ -244,7 +235,7 @@ class _Choice:
     def pose(self) -> Fields:
         map_frame = self._frame(("map",), self._said.map_frame)
         source, topic, type_name = self._pose_source(map_frame)
-        own = f"{self._near.namespace}/tf"
+        own = f"{self._namespace}/tf"
         return {
             "map_frame": map_frame,
             "base_frame": self._frame(BASE_FRAMES, self._said.base_frame),
@@ -275,13 +266,15 @@ class _Choice:
         others = list(said.cameras.values()) or [
             topic
             for topic in self._rank(CAMERAS)
-            if self._near.has(topic) and _place_of(topic, CAMERAS) < len(CAMERAS.endings)
+            if topic not in self._dead
+            and (not self._namespace or self._is_near(topic))
+            and _place_of(topic, CAMERAS) < len(CAMERAS.endings)
         ]
         ahead = said.camera_topic or next(iter(said.cameras.values()), self.best(CAMERAS))
         names = {topic: name for name, topic in said.cameras.items()}
         by_name: dict[str, str] = {}
         for topic in filter(None, (ahead, *others)):
-            name = names.get(topic) or name_camera(topic, namespace=self._near.namespace)
+            name = names.get(topic) or name_camera(topic, namespace=self._namespace)
             by_name.setdefault(name, topic)
         return tuple(self._camera(name, topic) for name, topic in by_name.items())
 
@@ -312,8 +305,7 @@ class _Choice:
         name = self._said.navigation_name
         if self._said.navigation is None:
             named = [kind for kind, known in found.items() if known is not None]
-            dead = self._near.dead
-            alive = [kind for kind in named if end_of_goals(kind, found[kind]) not in dead]
+            alive = [kind for kind in named if end_of_goals(kind, found[kind]) not in self._dead]
             kind = next(iter([*alive, *named]), NavigationKind.NONE)
             name = name or found.get(kind)
         else:
@@ -332,14 +324,13 @@ class _Choice:
         return USUAL_NAMES.get(kind)
 
     def _action(self, ending: str) -> str | None:
-        return self._near.first(name for name in self._graph.actions if name.endswith(ending))
+        return self._first(name for name in self._graph.actions if name.endswith(ending))
 
     def _move_base(self) -> str | None:
         goals = self._graph.topics_of(MOVE_BASE_GOAL)
         names = [topic.removesuffix("/goal") for topic in goals if topic.endswith("/goal")]
-        dead = self._near.dead
-        return self._near.first(
-            sorted(names, key=lambda name: (f"{name}/status" in dead, name.count("/"), name))
+        return self._first(
+            sorted(names, key=lambda name: (f"{name}/status" in self._dead, name.count("/"), name))
         )
 
     def _type(self, topic: str, said: str | None, guess: str) -> str:
@@ -354,7 +345,7 @@ class _Choice:
                 return name
             prefixed = [frame for frame in sorted(self._frames) if frame.endswith(f"/{name}")]
             if prefixed:
-                return str(self._near.first(prefixed)).lstrip("/")
+                return str(self._first(prefixed)).lstrip("/")
         return names[-1]
 
 

@@ -339,4 +339,4 @@ class RobotWatch:
         """Return when a frame is there that has not been, or when they lead to the base at last."""
         did_lead = self._leads_to_base
         while self._frames.tree.frames == self._frames_seen and self._leads_to_base == did_lead:
-            await self._frames.wait_for_news()
+            await self._frames.news.wait()

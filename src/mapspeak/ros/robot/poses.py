@@ -6,7 +6,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.robot import StampedPose
-from mapspeak.ros.activity import Subscription
+from mapspeak.ros.activity import News, Subscription
 from mapspeak.ros.discovery.profile import (
     POSE_WITH_COVARIANCE,
     PoseSource,
@@ -35,7 +35,7 @@ class RobotClock:
         self._offset_s: float | None = None
         self._simulated_s: float | None = None
         self._ticked_s = 0.0
-        self._moved_on = anyio.Event()
+        self._moved_on = News()
 
     @property
     def now_s(self) -> float:
@@ -113,8 +113,7 @@ class RobotClock:
         if self._simulated_s == before_s:
             return
         self._ticked_s = anyio.current_time()
-        moved_on, self._moved_on = self._moved_on, anyio.Event()
-        moved_on.set()
+        self._moved_on.tell()
 
 
 PATIENCE_S = 3.0
@@ -208,6 +207,6 @@ class PoseKeeper:
 
     async def _wait_for_news(self) -> None:
         if self._topic is None:
-            await self._frames.wait_for_news()
+            await self._frames.news.wait()
         else:
             await self._topic.wait_for_more_than(self._topic.n_received, timeout_s=PATIENCE_S)
