@@ -12,8 +12,8 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import Twist, read_twist, write_twist
-from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.hub import Hub, Publication, Topic
+from mapspeak.rosbridge_server.navigation import Drives, ServedDrive
 from mapspeak.rosbridge_server.serving import listen
 from mapspeak.rosbridge_server.stack import NAVIGATORS, SLAM_NODES, RosStack, topics_of
 from mapspeak.spatial import OccupancyGrid

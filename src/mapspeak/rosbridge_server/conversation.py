@@ -12,7 +12,6 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json
 from mapspeak.ros.messages.fields import Dialect, bare_type
-from mapspeak.rosbridge_server.drives import ServedDrive
 from mapspeak.rosbridge_server.hub import (
     Compression,
     Frame,
@@ -22,11 +21,12 @@ from mapspeak.rosbridge_server.hub import (
     fragments_of,
 )
 from mapspeak.rosbridge_server.interfaces import RosSystem, refusal
-from mapspeak.rosbridge_server.nav2 import (
+from mapspeak.rosbridge_server.navigation import (
     ABORTED,
     ACTION,
     ACTION_TYPE,
     TF_ERROR,
+    ServedDrive,
     result_of,
     status_of,
 )

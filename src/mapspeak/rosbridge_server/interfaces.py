@@ -14,7 +14,7 @@ from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook
 from mapspeak.ros.definitions.typestore import name_in_ros2
 from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub
-from mapspeak.rosbridge_server.nav2 import Nav2
+from mapspeak.rosbridge_server.navigation import Nav2
 
 ROS2_DISTRIBUTION = "jazzy"
 

@@ -11,8 +11,8 @@ from functools import partial
 
 from mapspeak.errors import MapspeakError
 from mapspeak.ros.messages.fields import Dialect, Message, write_header
-from mapspeak.rosbridge_server.drives import BASE_FRAME
 from mapspeak.rosbridge_server.interfaces import RosSystem, Values
+from mapspeak.rosbridge_server.navigation import BASE_FRAME
 from mapspeak.skill import ParameterKind, Skill, SkillProgress, SkillState
 
 PACKAGE, NODE = "robot_skills", "/robot_skills"

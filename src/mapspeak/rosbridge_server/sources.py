@@ -22,8 +22,8 @@ from mapspeak.ros.messages.poses import (
     write_transforms,
 )
 from mapspeak.ros.messages.scans import LaserScan, write_camera_info, write_scan
-from mapspeak.rosbridge_server.drives import BASE_FRAME
 from mapspeak.rosbridge_server.hub import Hub
+from mapspeak.rosbridge_server.navigation import BASE_FRAME
 from mapspeak.rosbridge_server.skillservices import BATTERY_TOPIC, write_battery
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid

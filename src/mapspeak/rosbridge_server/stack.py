@@ -13,11 +13,9 @@ from mapspeak.ros.discovery.watch import COSTMAPS
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FramedPose, read_twist
-from mapspeak.rosbridge_server.drives import BASE_FRAME, Drives
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub, Publication, Topic
 from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem, Values
-from mapspeak.rosbridge_server.movebase import MoveBase
-from mapspeak.rosbridge_server.nav2 import ACTION, Nav2
+from mapspeak.rosbridge_server.navigation import ACTION, BASE_FRAME, Drives, MoveBase, Nav2
 from mapspeak.rosbridge_server.parameters import Parameters, add_parameter_services
 from mapspeak.rosbridge_server.rosapi import add_rosapi
 from mapspeak.rosbridge_server.skillservices import (

@@ -38,6 +38,7 @@ from mapspeak.safety.deciding import (
     decide,
 )
 from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit, Surveyor
+from mapspeak.safety.guardedrobot import GuardedRobot
 from mapspeak.safety.policy import (
     Approval,
     AreaRule,
@@ -49,7 +50,6 @@ from mapspeak.safety.policy import (
     WhenBusy,
 )
 from mapspeak.safety.policyfile import load_policy
-from mapspeak.safety.robot import GuardedRobot
 from mapspeak.safety.velocities import HandDriving, publishing_for, zero_velocity_of
 
 __all__ = [

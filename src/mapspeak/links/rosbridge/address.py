@@ -5,7 +5,7 @@ import ssl
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from urllib.parse import parse_qsl, urlencode
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from websockets.exceptions import InvalidURI
 from websockets.uri import WebSocketURI, parse_uri
@@ -39,7 +39,7 @@ class RobotAddress:
 
     def __post_init__(self) -> None:
         uri = _parse(self.url)
-        object.__setattr__(self, "url", _with_port(self.url, uri))
+        object.__setattr__(self, "url", _with_port(self.url))
         if self.ca_file is not None and not uri.secure:
             raise ConfigError(
                 f"{self.shown} is not encrypted, so that a CA file says nothing.",
@@ -101,10 +101,8 @@ def _parse(url: str) -> WebSocketURI:
         ) from error
 
 
-def _with_port(url: str, uri: WebSocketURI) -> str:
-    authority = url.split("://", 1)[1].split("/", 1)[0].split("?", 1)[0]
-    has_port = authority.rsplit("@", 1)[-1].rsplit("]", 1)[-1].rpartition(":")[1] == ":"
-    if has_port:
+def _with_port(url: str) -> str:
+    parts = urlsplit(url)
+    if parts.port is not None:
         return url
-    scheme = "wss" if uri.secure else "ws"
-    return url.replace(f"{scheme}://{authority}", f"{scheme}://{authority}:{DEFAULT_PORT}", 1)
+    return parts._replace(netloc=f"{parts.netloc.rstrip(':')}:{DEFAULT_PORT}").geturl()

@@ -81,7 +81,7 @@ class Navigation:
     """A kind of navigation.
 
     Attributes:
-        write_goal: Gives the goal's fields for a pose.
+        pose_field: The goal's field for its pose.
         read_feedback: Gives how far is left, and how often it had to try again, for a goal.
         feedback_s: Robot time within which it gives feedback as long as it works.
     """
@@ -89,7 +89,7 @@ class Navigation:
     title: str
     dialect: Dialect
     type_name: str
-    write_goal: Callable[[FramedPose], Message]
+    pose_field: str
     read_feedback: Callable[[Message, Pose], tuple[float | None, int]]
     feedback_s: float = 10.0
 
@@ -138,7 +138,10 @@ class ActionDriver:
         """Send a goal, and wait until navigation has taken or refused it."""
         before = [(record, sent) for record, sent in self._drives if not record.is_over]
         pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
-        sent = await self._client.send(self._navigation.write_goal(pose), through=self._connection)
+        written = write_pose_stamped(pose, dialect=self._navigation.dialect)
+        sent = await self._client.send(
+            {self._navigation.pose_field: written}, through=self._connection
+        )
         record = GoalRecord(goal, sent=sent)
         self._drives = [*before, (record, sent)]
         for replaced, _ in before:
@@ -221,10 +224,6 @@ class ActionDriver:
         return state, Cause(code=code, name=navigation.title, quote=sent.reason)
 
 
-def _write_move_base_goal(pose: FramedPose) -> Message:
-    return {"target_pose": write_pose_stamped(pose, dialect=Dialect.ROS1)}
-
-
 def _read_move_base_feedback(feedback: Message, goal: Pose) -> tuple[float | None, int]:
     try:
         here = read_pose_stamped(feedback.get("base_position") or {}).pose
@@ -238,7 +237,7 @@ MOVE_BASE = Navigation(
     title="move_base",
     dialect=Dialect.ROS1,
     type_name="move_base_msgs/MoveBase",
-    write_goal=_write_move_base_goal,
+    pose_field="target_pose",
     read_feedback=_read_move_base_feedback,
     # It gives none while a recovery turns the robot once round.
     feedback_s=20.0,
@@ -247,10 +246,6 @@ MOVE_BASE = Navigation(
 
 LARGEST = 1e9
 """No distance and no count is larger; a larger number is not from Nav2."""
-
-
-def _write_nav2_goal(pose: FramedPose) -> Message:
-    return {"pose": write_pose_stamped(pose, dialect=Dialect.ROS2), "behavior_tree": ""}
 
 
 def _read_nav2_feedback(feedback: Message, _goal: Pose) -> tuple[float | None, int]:
@@ -268,7 +263,7 @@ NAV2 = Navigation(
     title="Navigation",
     dialect=Dialect.ROS2,
     type_name="nav2_msgs/action/NavigateToPose",
-    write_goal=_write_nav2_goal,
+    pose_field="pose",
     read_feedback=_read_nav2_feedback,
 )
 
