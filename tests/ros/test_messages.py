@@ -199,7 +199,7 @@ def test_a_cameras_angle_comes_from_its_matrix(fov_rad: float | None, dialect: D
 def test_types_and_times_are_written_as_each_ros_does() -> None:
     assert Dialect.ROS1.type_name("nav_msgs/msg/Path") == "nav_msgs/Path"
     assert Dialect.ROS2.type_name("nav_msgs/Path") == "nav_msgs/msg/Path"
-    assert Dialect.ROS2.service_type_name("std_srvs/Empty") == "std_srvs/srv/Empty"
+    assert Dialect.ROS2.type_name("std_srvs/Empty", "srv") == "std_srvs/srv/Empty"
     assert write_stamp(1.25, dialect=Dialect.ROS1) == {"secs": 1, "nsecs": 250_000_000}
     assert write_stamp(1.25, dialect=Dialect.ROS2) == {"sec": 1, "nanosec": 250_000_000}
 

@@ -151,6 +151,7 @@ class ActionGoal:
         end: As the connection has told it.
         feedback: The latest.
         type: Of the action.
+        through: The connection it was sent over, and is cancelled over; it may be guarded.
         n_seen: How many goals the server had listed before.
         owner: The client with whom it ends; None where the caller ends it.
         server_id: The action server's id of it; None where unknown.
@@ -176,6 +177,7 @@ class ActionGoal:
         self.end: ActionEnd | None = None
         self.feedback: Message | None = None
         self.type = ""
+        self.through: Any = None
         self.n_seen = 0
         self.owner: str | None = None
         self.state = ActionState.SENT

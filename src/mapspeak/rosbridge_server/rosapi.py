@@ -108,7 +108,7 @@ def _about_nodes_and_services(system: RosSystem) -> Answers:
         },
         "services_for_type": lambda args: {"services": _names_of_type(args, system.services)},
         "service_type": lambda args: {
-            "type": system.dialect.service_type_name(found.type) if (found := find(args)) else ""
+            "type": system.dialect.type_name(found.type, "srv") if (found := find(args)) else ""
         },
         "service_node": lambda args: {"node": found.node if (found := find(args)) else ""},
         # On ROS 1 rosapi finds none, whatever there is.

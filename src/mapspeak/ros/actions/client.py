@@ -62,7 +62,6 @@ class ActionClient(ABC):
         self._patience = connection.patience
         self._list = statuses
         self._goals: dict[str, ActionGoal] = {}
-        self._ways: dict[str, RosConnection] = {}
         self._being_ended: set[str] = set()
         self._statuses: dict[str, ActionState] = {}
         self._feedback_within_s = math.inf
@@ -249,11 +248,11 @@ class ActionClient(ABC):
 
     @abstractmethod
     async def _begin(self, arguments: Message, through: RosConnection) -> ActionGoal:
-        """Send a goal, and keep it with its way."""
+        """Send a goal, and keep it."""
 
     def _keep(self, goal: ActionGoal, through: RosConnection) -> None:
-        goal.type = self.type_name
-        self._goals[goal.id], self._ways[goal.id] = goal, through
+        goal.type, goal.through = self.type_name, through
+        self._goals[goal.id] = goal
 
     @abstractmethod
     def _ask_to_cancel(self, goal: ActionGoal) -> None:
@@ -329,7 +328,7 @@ class ActionClient(ABC):
         """Forget goals that are over on both sides; of withdrawn ones the latest are kept."""
         over = [each for each in self.goals if each.is_over and each.id not in self._being_ended]
         for goal in over[: max(len(over) - N_KEPT, 0)]:
-            del self._goals[goal.id], self._ways[goal.id]
+            del self._goals[goal.id]
 
     def _tell(self) -> None:
         for listener in self.listeners:

@@ -75,17 +75,17 @@ class Ros1ActionClient(ActionClient):
         try:
             await through.publish(f"{self.action}/goal", message)
         except BaseException:
-            del self._goals[goal_id], self._ways[goal_id]
+            del self._goals[goal_id]
             raise
         return goal
 
     def _ask_to_cancel(self, goal: ActionGoal) -> None:
         # Where nothing is open now, it is asked again as soon as the list shows the goal.
         message = {"stamp": NOW, "id": goal.id}
-        self._ways[goal.id].publish_everywhere(f"{self.action}/cancel", message)
+        goal.through.publish_everywhere(f"{self.action}/cancel", message)
 
     async def _cancel(self, goal: ActionGoal) -> bool:
-        self._publish_cancel(goal.id, self._ways[goal.id])
+        self._publish_cancel(goal.id, goal.through)
         return False
 
     def _publish_cancel(self, goal_id: str, through: RosConnection) -> None:

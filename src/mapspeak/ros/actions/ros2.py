@@ -84,7 +84,7 @@ class Ros2ActionClient(ActionClient):
         return goal
 
     def _ask_to_cancel(self, goal: ActionGoal) -> None:
-        self._ways[goal.id].cancel_goal(goal)
+        goal.through.cancel_goal(goal)
         if goal.is_withdrawn:
             goal.n_lists_at_end = self._list.n_received
             if goal.server_id is None:
@@ -93,12 +93,12 @@ class Ros2ActionClient(ActionClient):
 
     async def _cancel(self, goal: ActionGoal) -> bool:
         if goal.ros_id is None:
-            self._ways[goal.id].cancel_goal(goal)
+            goal.through.cancel_goal(goal)
         if goal.server_id is None:
             return False
         uuid = list(bytes.fromhex(goal.server_id))
         arguments = {"goal_info": {"goal_id": {"uuid": uuid}}}
-        answer = await self._call_cancel(self._ways[goal.id], arguments)
+        answer = await self._call_cancel(goal.through, arguments)
         if answer.get("return_code", 0) == 0 and answer.get("goals_canceling") == []:
             raise self._refusal(REFUSED)
         return answer.get("return_code", 0) in ENDED
@@ -309,7 +309,7 @@ class Ros2ActionClient(ActionClient):
         begun_s = anyio.current_time()
         for pause_s in SUSPECTED_S:
             for goal in self._unresolved():
-                self._ways[goal.id].cancel_goal(goal)
+                goal.through.cancel_goal(goal)
             await anyio.sleep(pause_s)
             state = self._statuses.get(server_id, ActionState.CANCELLED)
             is_late = anyio.current_time() - begun_s > UNNAMED_S

@@ -202,15 +202,10 @@ class Dialect(StrEnum):
     ROS1 = "ros1"
     ROS2 = "ros2"
 
-    def type_name(self, name: str) -> str:
-        """Return a message's type as this ROS writes it, such as "nav_msgs/msg/OccupancyGrid"."""
+    def type_name(self, name: str, kind: str = "msg") -> str:
+        """Return a type as this ROS writes it, such as "nav_msgs/msg/OccupancyGrid"."""
         package, _, last = bare_type(name).partition("/")
-        return f"{package}/msg/{last}" if self is Dialect.ROS2 else f"{package}/{last}"
-
-    def service_type_name(self, name: str) -> str:
-        """Return a service's type as this ROS writes it, such as "std_srvs/srv/Empty"."""
-        package, _, last = bare_type(name).partition("/")
-        return f"{package}/srv/{last}" if self is Dialect.ROS2 else f"{package}/{last}"
+        return f"{package}/{kind}/{last}" if self is Dialect.ROS2 else f"{package}/{last}"
 
 
 def bare_type(name: str) -> str:
