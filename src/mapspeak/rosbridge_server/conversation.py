@@ -11,9 +11,9 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json
+from mapspeak.links.rosbridge.protocol.conversation import Encoding
 from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.hub import (
-    Compression,
     Frame,
     Outbox,
     Publication,
@@ -57,10 +57,10 @@ class ClientSubscription:
         return int(min(_number(each, "queue_length") for each in self.options.values()))
 
     @property
-    def compression(self) -> Compression | None:
+    def encoding(self) -> Encoding | None:
         """The last in rosbridge's order of those asked for; None for one that is not known."""
         asked = {str(each.get("compression") or "none") for each in self.options.values()}
-        known = [each for each in Compression if each in asked]
+        known = [each for each in Encoding if each in asked]
         return known[-1] if known else None
 
 
@@ -111,10 +111,10 @@ class ClientConversation:
 
     def _frame_of(self, publication: Publication) -> Frame | None:
         subscription = self._subscriptions.get(publication.topic)
-        compression = subscription.compression if subscription else None
-        if compression is None or self._is_broken(compression, publication.type):
+        encoding = subscription.encoding if subscription else None
+        if encoding is None or self._is_broken(encoding, publication.type):
             return None
-        return publication.frame(compression)
+        return publication.frame(encoding)
 
     async def handle(self, frame: str | bytes) -> None:
         """Carry one operation out."""
@@ -280,12 +280,12 @@ class ClientConversation:
 
     # --- inside ---
 
-    def _is_broken(self, compression: Compression, message_type: str) -> bool:
+    def _is_broken(self, encoding: Encoding, message_type: str) -> bool:
         """Return True for what rosbridge on ROS 2 fails to send: png, lists of fixed length."""
-        if self._stack.dialect is Dialect.ROS1 or compression is Compression.NONE:
+        if self._stack.dialect is Dialect.ROS1 or encoding is Encoding.JSON:
             return False
         has_fixed_array = self._stack.interfaces.has_fixed_array
-        return compression is Compression.PNG or has_fixed_array(message_type)
+        return encoding is Encoding.PNG or has_fixed_array(message_type)
 
     def _checked_type(self, topic: str, given: object) -> str:
         """Return the topic's type; a given type must be the same, as either ROS writes it."""

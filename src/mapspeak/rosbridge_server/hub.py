@@ -6,22 +6,14 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cached_property
 
 import anyio
 from PIL import Image
 
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
+from mapspeak.links.rosbridge.protocol.conversation import Encoding
 from mapspeak.ros.messages.fields import Message, bare_type
-
-
-class Compression(StrEnum):
-    """How a client wants a topic's messages; later ones win where it asked for several."""
-
-    NONE = "none"
-    PNG = "png"
-    CBOR = "cbor"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +37,14 @@ class Publication:
         self.type = message_type
         self.message = message
 
-    def frame(self, compression: Compression) -> Frame:
+    def frame(self, encoding: Encoding) -> Frame:
         """Return the message as a client wants it."""
-        match compression:
-            case Compression.CBOR:
+        match encoding:
+            case Encoding.CBOR:
                 return Frame(self._cbor, is_text=False)
-            case Compression.PNG:
+            case Encoding.PNG:
                 return Frame(self._png, is_text=True)
-            case Compression.NONE:
+            case Encoding.JSON:
                 return Frame(self._json, is_text=True)
 
     @property

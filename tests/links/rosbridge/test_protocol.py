@@ -206,7 +206,7 @@ def test_pieces_are_put_together_in_any_order_with_a_fraction_for_a_total() -> N
     ]
     assert events[:-1] == [None] * 4
     assert published(events[-1]).values == {"data": "hello"}
-    assert conversation.n_bytes_held == 0
+    assert conversation.fragments.n_bytes == 0
 
 
 def test_a_piece_that_comes_twice_changes_nothing() -> None:
@@ -231,7 +231,7 @@ def test_pieces_that_are_never_complete_do_not_fill_the_memory() -> None:
     for number in range(1_000):
         piece = {"op": "fragment", "id": number, "num": 0, "total": 2, "data": "x" * 1_000}
         assert conversation.receive(frame(piece), is_text=True) is None
-        assert conversation.n_bytes_held <= 10_000
+        assert conversation.fragments.n_bytes <= 10_000
 
 
 @pytest.mark.parametrize("total", [0, 0.9, -1, 1e300, "3", None, True])
@@ -404,7 +404,7 @@ def test_any_operation_gives_an_event_and_never_an_exception(
             conversation.receive(json.dumps(operation).encode(), is_text=True)
         )
         check_that_it_is_an_event(conversation.receive(cbor2.dumps(operation), is_text=False))
-        assert conversation.n_bytes_held <= 10_000
+        assert conversation.fragments.n_bytes <= 10_000
 
 
 @settings(max_examples=100)

@@ -107,18 +107,14 @@ class Channel:
         with suppress(LinkError):
             await self.send(text, timeout_s=self._patience.answer_s)
 
-    async def wait_until_up(self, timeout_s: float) -> None:
-        """Return at once, or when there is a connection again."""
-        await self._wait_for_connection(timeout_s)
-
     async def send(self, text: bytes, *, timeout_s: float) -> None:
         """Send something once there is a connection."""
-        (await self._wait_for_connection(timeout_s)).send(text)
+        (await self.wait_until_up(timeout_s)).send(text)
 
     async def call(self, text: bytes, *, call_id: str, what: str, timeout_s: float) -> object:
         """Return the answer of a service."""
         deadline_s = anyio.current_time() + timeout_s
-        connection = await self._wait_for_connection(timeout_s)
+        connection = await self.wait_until_up(timeout_s)
         n_answers = connection.n_answers
         answer: ServerEvent | None = None
         with anyio.move_on_after(deadline_s - anyio.current_time()) as limit:
@@ -204,7 +200,8 @@ class Channel:
         self._up_since_s = anyio.current_time()
         self._is_up.set()
 
-    async def _wait_for_connection(self, timeout_s: float) -> SocketConnection:
+    async def wait_until_up(self, timeout_s: float) -> SocketConnection:
+        """Return the connection at once, or when there is one again."""
         with anyio.move_on_after(self._limit_s(timeout_s)):
             while self._connection is None or not self.is_up or self._connection.is_over.is_set():
                 # A connection that has just ended is noticed by `_keep_up` before long.

@@ -3,8 +3,9 @@
 import socket
 import ssl
 from collections import deque
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import partial
 
 import anyio
 import anyio.lowlevel
@@ -130,17 +131,11 @@ class WebSocket:
 
     async def send(self, text: bytes) -> None:
         """Send one text message."""
-        if self._protocol.state is not State.OPEN:
-            raise SocketClosed
-        self._protocol.send_text(text)
-        await self._flush()
+        await self._say(partial(self._protocol.send_text, text))
 
     async def ping(self) -> None:
         """Ask the other end for a sign of life."""
-        if self._protocol.state is not State.OPEN:
-            raise SocketClosed
-        self._protocol.send_ping(b"")
-        await self._flush()
+        await self._say(partial(self._protocol.send_ping, b""))
 
     async def say_goodbye(self) -> None:
         """Announce the end of our messages; the receiver learns when the other end agrees."""
@@ -190,6 +185,12 @@ class WebSocket:
         if frame.fin:
             parts, self._parts = tuple(self._parts), []
             self._arrived.append(Received(parts, self._is_text, self._n_bytes))
+
+    async def _say(self, say: Callable[[], None]) -> None:
+        if self._protocol.state is not State.OPEN:
+            raise SocketClosed
+        say()
+        await self._flush()
 
     async def _flush(self) -> None:
         # Bytes of all callers leave in the order in which they were made.

@@ -76,16 +76,14 @@ class Conversation:
 
     Args:
         max_bytes: The largest accepted message, whole or in fragments.
+
+    Attributes:
+        fragments: Of messages that have come in part.
     """
 
     def __init__(self, *, max_bytes: int = MAX_FRAME_BYTES) -> None:
         self._max_bytes = max_bytes
-        self._fragments = FragmentStore(max_bytes=max_bytes)
-
-    @property
-    def n_bytes_held(self) -> int:
-        """Of messages that have come in part."""
-        return self._fragments.n_bytes
+        self.fragments = FragmentStore(max_bytes=max_bytes)
 
     def is_light(self, frame: bytes | bytearray) -> bool:
         """Return whether reading a frame is a matter of milliseconds at the worst.
@@ -112,7 +110,7 @@ class Conversation:
             raise FrameError(FrameFault.UNKNOWN_OPERATION, type(operation).__name__)
         name = operation.get("op")
         if name == "fragment" and not is_whole:
-            whole = self._fragments.add(operation)
+            whole = self.fragments.add(operation)
             if whole is None:
                 return None
             return self._understand(self._checked(whole, decode_json), is_whole=True)
@@ -148,9 +146,10 @@ MAX_NESTING = 32
 
 
 class Encoding(StrEnum):
-    """The server's encoding of the messages of a topic."""
+    """The server's encoding of a topic's messages; of several asked for, it takes the last here."""
 
     JSON = "none"
+    PNG = "png"
     CBOR = "cbor"
 
 
