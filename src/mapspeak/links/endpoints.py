@@ -75,6 +75,15 @@ def unknown(name: str) -> LinkError:
     )
 
 
+def no_answer(service: str, timeout_s: float) -> LinkError:
+    """Return the error for a service that is there and does not answer."""
+    return LinkError(
+        f"{service} did not answer within {timeout_s:g} s.",
+        hint="The node that serves it may be busy or stuck: ask again, look at its log, or restart "
+        "it. The connection is kept.",
+    )
+
+
 def nobody_serves(service: str) -> LinkError:
     """Return the error for a service that is not there."""
     return LinkError(

@@ -3,17 +3,19 @@
 import difflib
 import uuid
 from abc import abstractmethod
-from collections.abc import Callable, Coroutine, Iterable, Mapping
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
+import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
-from mapspeak.ros.link import Advertising, say_again
+from mapspeak.ros.link import Advertising, plain_errors, say_again
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.parameters import ParameterServices
 from mapspeak.ros.patience import Patience
@@ -170,6 +172,18 @@ class RosConnection(Advertising, ParameterServices):
         if self._tasks is not None:
             self._tasks.start_soon(work)
 
+    async def _start(self, tasks: TaskGroup) -> None:
+        """Connect, and keep connected in the background.
+
+        Raises:
+            LinkError: The robot cannot be reached.
+        """
+        self._tasks = tasks
+
+    @abstractmethod
+    async def _leave(self) -> None:
+        """Close, once the last publications have had time to arrive."""
+
     @abstractmethod
     async def wait_until_connected(self) -> None:
         """Return at once, or when the connection is open again."""
@@ -305,6 +319,27 @@ class RosConnection(Advertising, ParameterServices):
         "package/Type_Request" and "package/Type_Response", an action "package/Type_Goal",
         "package/Type_Result" and "package/Type_Feedback".
         """
+
+
+Connection = TypeVar("Connection", bound=RosConnection)
+
+
+@asynccontextmanager
+async def keep_open(connection: Connection) -> AsyncGenerator[Connection]:
+    """Keep a connection open while the context lasts.
+
+    Raises:
+        LinkError: The robot cannot be reached.
+    """
+    with plain_errors():
+        async with anyio.create_task_group() as tasks:
+            try:
+                await connection._start(tasks)  # noqa: SLF001 - half of the same thing
+                yield connection
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await connection._leave()  # noqa: SLF001 - likewise
+                tasks.cancel_scope.cancel()
 
 
 def started_over(connection: RosConnection | None) -> Started:

@@ -49,7 +49,7 @@ async def test_a_service_that_does_not_answer_is_an_error_after_the_limit() -> N
     async with open_both(
         lambda node: node.serve("/switch", SET_BOOL, lambda _request, _reply: None)
     ) as (_, connection):
-        with pytest.raises(LinkError, match="has not answered"):
+        with pytest.raises(LinkError, match="did not answer"):
             await connection.call_service("/switch", {"data": True}, timeout_s=0.1)
 
 

@@ -36,9 +36,8 @@ from mapspeak.links.endpoints import (
 from mapspeak.links.native import SEND_GOAL, NativeLink
 from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.link import plain_errors
 from mapspeak.ros.patience import USUAL_PATIENCE, Patience
-from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
+from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph, keep_open
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
 logger = logging.getLogger(__name__)
@@ -110,13 +109,9 @@ class DdsConnection(NativeLink):
         """Humble by its longer ids; empty for all others."""
         return HUMBLE if self.discovery.has_long_ids else ""
 
-    async def start(self, tasks: TaskGroup) -> None:
-        """Enter the domain, and return when its participants have been found.
-
-        Raises:
-            LinkError: The domain is empty.
-        """
-        self._tasks = tasks
+    async def _start(self, tasks: TaskGroup) -> None:
+        """Enter the domain, and return when its participants have been found."""
+        await super()._start(tasks)
         self._participant.watch_endpoints(self.discovery.take_writer, self.discovery.take_reader)
         tasks.start_soon(self._participant.run)
         await self.wait_until_connected()
@@ -136,8 +131,7 @@ class DdsConnection(NativeLink):
                     await self.discovery.news.wait()
                 is_news = not quiet.cancelled_caught
 
-    async def aclose(self) -> None:
-        """Leave the domain once the last publications have arrived."""
+    async def _leave(self) -> None:
         if self._advertised:
             await self._participant.flush(timeout_s=ARRIVAL_S)
         self._participant.close()
@@ -346,16 +340,9 @@ async def open_dds_connection(
     Raises:
         LinkError: DDS cannot be started, or the domain is empty.
     """
-    with plain_errors():
-        async with anyio.create_task_group() as tasks:
-            connection = DdsConnection(network, framing_of=framing_of, patience=patience)
-            try:
-                await connection.start(tasks)
-                yield connection
-            finally:
-                with anyio.CancelScope(shield=True):
-                    await connection.aclose()
-                tasks.cancel_scope.cancel()
+    made = DdsConnection(network, framing_of=framing_of, patience=patience)
+    async with keep_open(made) as connection:
+        yield connection
 
 
 @asynccontextmanager

@@ -13,13 +13,12 @@ from typing import Any
 
 import anyio
 
-from mapspeak.errors import LinkError
 from mapspeak.links.cdr import HEADER_BYTES
 from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import Quality, reply_topic, request_topic
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
-from mapspeak.links.endpoints import Sample, nobody_serves
+from mapspeak.links.endpoints import Sample, no_answer, nobody_serves
 from mapspeak.links.goals import Answer
 from mapspeak.ros.port import new_id
 
@@ -94,7 +93,7 @@ class DdsService:
         with anyio.move_on_at(deadline_s):
             async with self._turns:
                 return await self._call(request, deadline_s=deadline_s, timeout_s=timeout_s)
-        raise self._silence(timeout_s)
+        raise no_answer(self.service, timeout_s)
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
         """Return when the requests have a reader."""
@@ -145,17 +144,11 @@ class DdsService:
         # A held answer is ours if no other followed: the earlier call had no answer.
         found = call.answer or call.held
         if found is None:
-            raise self._silence(timeout_s)
+            raise no_answer(self.service, timeout_s)
         self._n_open = 0
         if found.refusal is not None:
             raise found.refusal
         return found
-
-    def _silence(self, timeout_s: float) -> LinkError:
-        return LinkError(
-            f"{self.service} has not answered within {timeout_s:g} s.",
-            hint="The node that serves it may be busy or stuck: try again, or restart it.",
-        )
 
     # --- answers
 

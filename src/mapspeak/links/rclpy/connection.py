@@ -20,7 +20,7 @@ from mapspeak.ros.activity import Subscription
 from mapspeak.ros.link import plain_errors
 from mapspeak.ros.messages.fields import bare_type, check_name
 from mapspeak.ros.patience import Patience
-from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection
+from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection, keep_open
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""
@@ -50,14 +50,11 @@ class Ros2Connection(NativeLink):
 
     distro = ""
 
-    def __init__(
-        self, participant: RclpyParticipant, tasks: TaskGroup, *, distro: str, patience: Patience
-    ) -> None:
+    def __init__(self, participant: RclpyParticipant, *, distro: str, patience: Patience) -> None:
         self._ours = RclpyTypes()
         super().__init__(self._ours, patience)
         self.distro = distro
         self._participant = participant
-        self._tasks = tasks
         self._services: dict[str, RclpyService] = {}
 
     @property
@@ -70,15 +67,15 @@ class Ros2Connection(NativeLink):
         """True, with or without subscribers to our topics."""
         return True
 
-    async def start(self) -> None:
+    async def _start(self, tasks: TaskGroup) -> None:
         """Return when the participants have been found, or there are none."""
+        await super()._start(tasks)
         self.start_soon(self._watch)
         if await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
             with anyio.move_on_after(LONGEST_LOOK_S):
                 await wait_until_quiet(self)
 
-    async def aclose(self) -> None:
-        """Wait a moment until the last publications have arrived."""
+    async def _leave(self) -> None:
         for _, writer in self._advertised.values():
             await anyio.to_thread.run_sync(writer.flush)
 
@@ -297,16 +294,9 @@ async def open_connection(
         async with (
             BlockingPortal() as portal,
             _open_participant(domain_id, portal, variables) as participant,
-            anyio.create_task_group() as tasks,
+            keep_open(Ros2Connection(participant, distro=distro, patience=patience)) as connection,
         ):
-            connection = Ros2Connection(participant, tasks, distro=distro, patience=patience)
-            try:
-                await connection.start()
-                yield connection
-            finally:
-                with anyio.CancelScope(shield=True):
-                    await connection.aclose()
-                tasks.cancel_scope.cancel()
+            yield connection
 
 
 @asynccontextmanager

@@ -8,8 +8,7 @@ import anyio
 from rclpy.duration import Duration
 from rclpy.serialization import deserialize_message, serialize_message
 
-from mapspeak.errors import LinkError
-from mapspeak.links.endpoints import Decode, Sample, Take, nobody_serves, understand
+from mapspeak.links.endpoints import Decode, Sample, Take, no_answer, nobody_serves, understand
 from mapspeak.links.goals import Answer
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import RclpyTypes, find_message
@@ -134,10 +133,7 @@ class RclpyService:
                 return Sample(content=self._read(future))
         finally:
             self._client.remove_pending_request(future)
-        raise LinkError(
-            f"{self.service} did not answer within {timeout_s:g} s.",
-            hint="The node that serves it may be stuck: look at its log, or restart it.",
-        )
+        raise no_answer(self.service, timeout_s)
 
     def post(self, request: bytes) -> int:
         """Send a request without waiting for the answer, and return its number."""

@@ -9,6 +9,7 @@ import anyio.lowlevel
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
+from mapspeak.links.endpoints import no_answer
 from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.connection import SocketConnection
 from mapspeak.links.rosbridge.protocol.conversation import Event, ServerEvent, write_operation
@@ -16,10 +17,6 @@ from mapspeak.links.rosbridge.websocket import open_websocket
 from mapspeak.ros.patience import Patience
 
 logger = logging.getLogger(__name__)
-
-SERVICE_HINT = (
-    "Check that the node which offers it is alive; the connection is kept, asking again is fine."
-)
 
 
 class Channel:
@@ -124,7 +121,7 @@ class Channel:
             # would be answered either.
             if connection.n_answers == n_answers:
                 self.replace(connection)
-            raise LinkError(f"{what} did not answer within {timeout_s:g} s.", hint=SERVICE_HINT)
+            raise no_answer(what, timeout_s)
         if answer is None:
             raise self._lost(f"was lost while {what} was asked")
         return _values_of(answer, what)

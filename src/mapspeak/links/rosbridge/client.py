@@ -23,10 +23,10 @@ from mapspeak.links.rosbridge.protocol.conversation import (
 from mapspeak.links.rosbridge.rosapi import Rosapi
 from mapspeak.ros.activity import ActionEnd, ActionGoal, Subscription
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.link import NOTICE_S, plain_errors
+from mapspeak.ros.link import NOTICE_S
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
 from mapspeak.ros.patience import USUAL_PATIENCE, Patience
-from mapspeak.ros.port import LinkName, OwnEnds, new_id
+from mapspeak.ros.port import LinkName, OwnEnds, keep_open, new_id
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
 logger = logging.getLogger(__name__)
@@ -106,18 +106,12 @@ class RosbridgeClient(Rosapi):
         await self._control.wait_until_up(self.patience.answer_s)
         await self._urgent.wait_until_up(self.patience.answer_s)
 
-    async def start(self, tasks: TaskGroup) -> None:
-        """Connect, and keep connected in the background.
-
-        Raises:
-            LinkError: The robot cannot be reached.
-        """
-        self._tasks = tasks
+    async def _start(self, tasks: TaskGroup) -> None:
+        await super()._start(tasks)
         await self._control.start(tasks)
         await self._urgent.start(tasks)
 
-    async def aclose(self) -> None:
-        """Close both sockets, once the last publications have had time to arrive."""
+    async def _leave(self) -> None:
         # rosbridge forgets a message when the socket that brought it closes at once.
         await anyio.sleep_until(self._published_s + self.patience.linger_s)
         async with anyio.create_task_group() as tasks:
@@ -324,16 +318,8 @@ async def open_client(
         ConfigError: An old package stands before one that is needed.
     """
     require_cbor()
-    client = RosbridgeClient(address, patience=patience)
-    with plain_errors():
-        async with anyio.create_task_group() as tasks:
-            await client.start(tasks)
-            try:
-                yield client
-            finally:
-                with anyio.CancelScope(shield=True):
-                    await client.aclose()
-                tasks.cancel_scope.cancel()
+    async with keep_open(RosbridgeClient(address, patience=patience)) as client:
+        yield client
 
 
 @asynccontextmanager
