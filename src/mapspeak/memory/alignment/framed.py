@@ -4,7 +4,7 @@ Only this module holds back records of other maps: readers get no waypoint, even
 not aligned with the robot's map.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 
@@ -13,7 +13,6 @@ from mapspeak.memory.alignment.keeping import FrameKeeper
 from mapspeak.memory.episodes.observation import MapPlacing
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import FrameId, Frames
-from mapspeak.memory.merging import Merge
 from mapspeak.memory.store.memorystore import MemoryStore, Records, Result, WriteReceipt
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
@@ -117,10 +116,6 @@ class FramedMemory(MemoryStore):
                 placings.append(MapPlacing(name, motion))
         return tuple(placings)
 
-    def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Write a waypoint that is in the frame of the robot's map."""
-        return self._received(self.store.write(self._in_frame(waypoint)))
-
     def change(
         self,
         change: Callable[[Records], Result],
@@ -136,15 +131,21 @@ class FramedMemory(MemoryStore):
         written = self.store.write_event(replace(event, frame=self.keeper.place()))
         return next(each for each in self.read_events() if each.id == written.id)
 
-    def remember(
-        self, waypoint: Waypoint, *, gone: Iterable[str] = ()
-    ) -> tuple[WriteReceipt, Merge]:
-        """Join a waypoint that is in the frame of the robot's map with what is remembered."""
-        receipt, merge = self.store.remember(self._in_frame(waypoint), gone=gone)
-        return self._received(receipt), merge
-
-    def _in_frame(self, waypoint: Waypoint) -> Waypoint:
-        return replace(waypoint, frame=self.keeper.place())
+    def join(
+        self, waypoint: Waypoint, join: Callable[[Waypoint | None, Waypoint], Waypoint]
+    ) -> WriteReceipt:
+        """Write what becomes of a waypoint that is in the frame of the robot's map."""
+        receipt = self.store.join(replace(waypoint, frame=self.keeper.place()), join)
+        frames = self.store.read().frames
+        written = self._place(receipt.waypoint, frames)
+        before = receipt.previous and self._place(receipt.previous, frames)
+        assert written is not None  # noqa: S101 - it was just written in this frame or one aligned
+        # The room of a present sighting is a room of the robot's map.
+        room_id = receipt.waypoint.room_id
+        return WriteReceipt(
+            waypoint=replace(written, room_id=room_id).present(),
+            previous=before and before.present(),
+        )
 
     def _place(self, waypoint: Waypoint, frames: Frames) -> Waypoint | None:
         """Return a waypoint in the frame of the robot's map; None if its alignment is unknown."""
@@ -161,16 +162,3 @@ class FramedMemory(MemoryStore):
             known = (waypoint, motion, waypoint.moved(motion, here))
             self._moved[id(waypoint)] = known
         return known[2]
-
-    def _received(self, receipt: WriteReceipt) -> WriteReceipt:
-        frames = self.store.read().frames
-        waypoint = self._place(receipt.waypoint, frames)
-        before = receipt.previous and self._place(receipt.previous, frames)
-        # The room of a present sighting is a room of the robot's map.
-        room_id = receipt.waypoint.room_id
-        assert waypoint is not None  # noqa: S101 - it was just written in this frame or one aligned
-        return replace(
-            receipt,
-            waypoint=replace(waypoint, room_id=room_id).present(),
-            previous=before and before.present(),
-        )

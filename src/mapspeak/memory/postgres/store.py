@@ -6,7 +6,7 @@ that had not ended when it last asked. A forgotten record stays as an empty row 
 something is written under its key again.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -229,12 +229,6 @@ class _Rows:
             known = {**self.frames.by_id, written.id: written}
             self.frames = Frames(tuple(known.values()))
         return cast("OneRecord", written)
-
-    def put_places(self, waypoints: Iterable[Waypoint]) -> None:
-        """Write many places."""
-        rows = [(_PLACE, name_key(each.name), Jsonb(data_of(each))) for each in waypoints]
-        with self._connection.cursor() as cursor:
-            cursor.executemany(_UPSERT, rows)
 
     def rename_place(self, former_key: str, waypoint: Waypoint) -> None:
         """Write a place where the one of another `name_key` was, which is removed."""

@@ -85,42 +85,38 @@ def _mark(store: MemoryStore, is_meant: _Test, *, is_gone: bool = True) -> Forgo
     """Mark the matching records as gone or not, all or none."""
     done: list[Forgotten] = []
 
+    def is_to_change(place: Waypoint, each: Landmark | None) -> bool:
+        return (each or place).is_gone != is_gone and is_meant(place, each)
+
     def change(known: SemanticMap) -> Iterable[Waypoint]:
-        changed = [(each, _marked(each, is_meant, is_gone=is_gone)) for each in known.waypoints]
-        n_landmarks = {
-            after.name: sum(
-                one.is_gone != other.is_gone
-                for one, other in zip(before.landmarks, after.landmarks, strict=True)
-            )
-            for before, after in changed
+        views = {
+            place.name: [each for each in place.landmarks if is_to_change(place, each)]
+            for place in known.waypoints
         }
+        whole = [place.name for place in known.waypoints if is_to_change(place, None)]
         done.append(
             Forgotten(
-                places=tuple(b.name for b, after in changed if b.is_gone != after.is_gone),
-                seen_from=tuple(name for name, n in n_landmarks.items() if n),
-                n_landmarks=sum(n_landmarks.values()),
+                places=tuple(whole),
+                seen_from=tuple(name for name, seen in views.items() if seen),
+                n_landmarks=sum(map(len, views.values())),
             )
         )
-        return [after for before, after in changed if after is not before]
+        return [
+            replace(
+                place,
+                is_gone=is_gone if place.name in whole else place.is_gone,
+                safety_landmarks=mark(place.safety_landmarks, views[place.name]),
+                functional_landmarks=mark(place.functional_landmarks, views[place.name]),
+            )
+            for place in known.waypoints
+            if place.name in whole or views[place.name]
+        ]
+
+    def mark(landmarks: Iterable[Landmark], meant: Collection[Landmark]) -> tuple[Landmark, ...]:
+        marked = (
+            each if each not in meant else replace(each, is_gone=is_gone) for each in landmarks
+        )
+        return tuple(marked)
 
     store.write_all(change)
     return done[-1]
-
-
-def _marked(place: Waypoint, is_meant: _Test, *, is_gone: bool) -> Waypoint:
-    def is_to_change(each: Landmark) -> bool:
-        return each.is_gone != is_gone and is_meant(place, each)
-
-    is_place = place.is_gone != is_gone and is_meant(place, None)
-    if not is_place and not any(map(is_to_change, place.landmarks)):
-        return place
-    safety, functional = (
-        tuple(replace(each, is_gone=is_gone) if is_to_change(each) else each for each in landmarks)
-        for landmarks in (place.safety_landmarks, place.functional_landmarks)
-    )
-    return replace(
-        place,
-        is_gone=is_gone if is_place else place.is_gone,
-        safety_landmarks=safety,
-        functional_landmarks=functional,
-    )

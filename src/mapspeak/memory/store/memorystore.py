@@ -35,10 +35,6 @@ class Records(Protocol):
     """The records of a memory during an atomic change."""
 
     @property
-    def map_id(self) -> str | None:
-        """The map that the memory names as its own."""
-
-    @property
     def frames(self) -> Frames:
         """All of them."""
 
@@ -56,9 +52,6 @@ class Records(Protocol):
 
     def put(self, record: OneRecord) -> OneRecord:
         """Write a record in place of the one with its key; return it as read back."""
-
-    def put_places(self, waypoints: Iterable[Waypoint]) -> None:
-        """Write many places."""
 
     def rename_place(self, former_key: str, waypoint: Waypoint) -> None:
         """Write a place where the one of another `name_key` was, which is removed."""
@@ -119,7 +112,7 @@ class MemoryStore(ABC):
         If the frame of the known one is aligned with the waypoint's, the record keeps its frame.
         If the alignment is unknown, both stay, the new one with a number behind its name.
         """
-        return self._write(waypoint, lambda _, placed: placed)
+        return self.join(waypoint, lambda _, placed: placed)
 
     def write_all(self, change: Callable[[SemanticMap], Iterable[Waypoint]]) -> None:
         """Write many waypoints, all or none; each into the memory of its map.
@@ -130,9 +123,9 @@ class MemoryStore(ABC):
 
         def write(records: Records) -> None:
             waypoints = tuple(change(records.read()))
-            for map_id in dict.fromkeys(each.map_id for each in waypoints):
-                records.bind(map_id)
-            records.put_places(waypoints)
+            for waypoint in waypoints:
+                records.bind(waypoint.map_id)
+                records.put(waypoint)
 
         self.change(write, alone=True)
 
@@ -164,8 +157,7 @@ class MemoryStore(ABC):
             merges.append(merge_waypoint(before, placed, gone=labels))
             return merges[-1].waypoint
 
-        receipt = self._write(waypoint, join)
-        return receipt, merges[-1]
+        return self.join(waypoint, join), merges[-1]
 
     def write_frames(self, change: Callable[[Frames], Frames]) -> Frames:
         """Write the frames, all or none; no record changes.
@@ -183,9 +175,15 @@ class MemoryStore(ABC):
 
         return self.change(write, alone=True)
 
-    def _write(
+    def join(
         self, waypoint: Waypoint, join: Callable[[Waypoint | None, Waypoint], Waypoint]
     ) -> WriteReceipt:
+        """Write what becomes of a waypoint beside the remembered one of its name.
+
+        Args:
+            join: Returns it, given the remembered one and the waypoint as a memory keeps it;
+                called once or more often.
+        """
         _require_same_map(waypoint, self.map_id)
         map_id = None if waypoint.frame else self.map_id or waypoint.map_id
 

@@ -185,17 +185,28 @@ def read_item(
     list_key: str, place: str | Node, default_id: str, map_id: str | None
 ) -> ListedRecord:
     """Read a record from its text, or where it is laid out in another way, from its node."""
+    text = place if isinstance(place, str) else None
+    data: Data = None if text is None else read_plain_record(text)
+    node = None if data is not None else _node_of(list_key, place)
+    data = data_of(node) if node is not None else data
+    try:
+        record = read_record(list_key, data, map_id, default_id=default_id)
+    except SemanticMapError as error:
+        path = error.path if isinstance(error, WrongRecordError) else ()
+        line, column = locate(node or _node_of(list_key, place), path)
+        raise TextFaultError(error.message, hint=error.hint, line=line, column=column) from error
+    misspelt = find_misspelt_keys(data) if list_key == "waypoints" else ()
+    return ListedRecord(record, key_of(record), text, tuple(misspelt))
+
+
+def _node_of(list_key: str, place: str | Node) -> Node:
+    """Return the node of an item of a list, given its text or that node."""
     if not isinstance(place, str):
-        return _read_node(list_key, place, default_id, map_id)
-    data = read_plain_record(place)
-    if data is not None:
-        try:
-            return replace(_item_of(list_key, data, default_id, map_id), text=place)
-        except SemanticMapError:
-            pass  # Read again below, to locate the fault.
+        return place
     tree = compose(place)
     if isinstance(tree, SequenceNode) and len(tree.value) == 1:
-        return replace(_read_node(list_key, tree.value[0], default_id, map_id), text=place)
+        node: Node = tree.value[0]
+        return node
     first_key = FIRST_KEYS[list_key]
     raise TextFaultError(
         f"This is not one of the {list_key}.",
@@ -203,22 +214,6 @@ def read_item(
         line=1,
         column=len(place) - len(place.lstrip()) + 1,
     )
-
-
-def _read_node(list_key: str, node: Node, default_id: str, map_id: str | None) -> ListedRecord:
-    data = data_of(node)
-    try:
-        return _item_of(list_key, data, default_id, map_id)
-    except SemanticMapError as error:
-        path = error.path if isinstance(error, WrongRecordError) else ()
-        line, column = locate(node, path)
-        raise TextFaultError(error.message, hint=error.hint, line=line, column=column) from error
-
-
-def _item_of(list_key: str, data: Data, default_id: str, map_id: str | None) -> ListedRecord:
-    record = read_record(list_key, data, map_id, default_id=default_id)
-    misspelt = find_misspelt_keys(data) if list_key == "waypoints" else ()
-    return ListedRecord(record, key_of(record), misspelt=tuple(misspelt))
 
 
 def _find_warnings(

@@ -10,20 +10,21 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
+from pydantic_core import CoreSchema, SchemaValidator, ValidationError, core_schema
+
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.events import Effect, Event, Every
 from mapspeak.memory.frames import MapFrame
 from mapspeak.memory.quoting import clean_line, name_key, quote_name, tell_name
 from mapspeak.memory.store import forms
-from mapspeak.memory.store.forms import Form, Wrong, WrongError, wrong
+from mapspeak.memory.store.forms import Form
 from mapspeak.memory.store.yamltext import Data
 from mapspeak.memory.waypoint import Confidence, Landmark, Waypoint
 
 FILE_VERSION = 1
 LANDMARK_KEYS = ("safety_landmarks", "functional_landmarks")
 
-_NO_KEY = "is not a key that belongs here"
 _POSE_EXAMPLE = "{x: 1.20, y: -3.40, yaw_deg: 90.0}"
 _EVENT_EXAMPLE = (
     "- {text: the floor is wet, place: C1, effect: closed, until: 2026-11-22T14:00:00+01:00}"
@@ -62,19 +63,20 @@ class WrongRecordError(SemanticMapError):
         path: The keys and numbers of items that lead to the first fault.
     """
 
-    def __init__(self, wrongs: tuple[Wrong, ...], example: str) -> None:
+    def __init__(self, error: ValidationError, example: str) -> None:
         # An unknown key is more often the misspelling of a missing one than a superfluous one.
-        first, *others = sorted(wrongs, key=lambda each: each.expected != _NO_KEY)
-        self.path = first.path
-        told = ".".join(tell_name(str(step)) for step in first.path) or "The record"
-        shown = f", {quote_name(first.value)}," if isinstance(first.value, str) else ""
+        faults = error.errors(include_url=False)
+        first, *others = sorted(faults, key=lambda each: each["type"] != "extra_forbidden")
+        self.path = first["loc"]
+        told = ".".join(tell_name(str(step)) for step in self.path) or "The record"
+        value = first["input"]
+        shown = f", {quote_name(value)}," if isinstance(value, str) else ""
+        expected = forms.EXPECTED[first["type"].partition("_")[0]].format(**first.get("ctx", {}))
         n_more = "1 more fault follows" if len(others) == 1 else f"{len(others)} more faults follow"
         more = f" {n_more} in this record." if others else ""
-        known = (_EXAMPLES[step] for step in reversed(first.path) if step in _EXAMPLES)
+        known = (_EXAMPLES[step] for step in reversed(self.path) if step in _EXAMPLES)
         example = example or next(known, _EXAMPLES["name"])
-        super().__init__(
-            f"{told}{shown} {first.expected}.{more}", hint=f"Write it like `{example}`."
-        )
+        super().__init__(f"{told}{shown} {expected}.{more}", hint=f"Write it like `{example}`.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +117,8 @@ class RecordKind:
     @cached_property
     def form(self) -> Form:
         """The form of a mapping of this kind within a record; it says nothing that is empty."""
-        return Form(self._read, lambda value: None if value is None else _said(self.write(value)))
+        schema = core_schema.no_info_after_validator_function(self._made, self._schema)
+        return Form(schema, lambda value: None if value is None else _said(self.write(value)))
 
     def read(self, data: Data, **more: object) -> Any:  # noqa: ANN401 - what it makes
         """Return the value that a record describes.
@@ -125,34 +128,39 @@ class RecordKind:
             SemanticMapError: The value refuses what it says.
         """
         try:
-            return self._read(data, **more)
-        except WrongError as error:
-            raise WrongRecordError(error.wrongs, self.example) from None
+            fields = self._validator.validate_python(data)
+        except ValidationError as error:
+            raise WrongRecordError(error, self.example) from None
+        return self._made(fields, **more)
 
     def write(self, value: object) -> dict[str, Data]:
         """Return the record of a value; None under keys without content."""
         return {key.name: key.form.write(getattr(value, key.field)) for key in self.keys}
 
-    def _read(self, data: Data, **fields: object) -> Any:  # noqa: ANN401 - what it makes
-        if not isinstance(data, dict):
-            raise wrong("is not a mapping of keys to values", data)
-        wrongs, by_name = list[Wrong](), self.by_name
-        for name, value in data.items():
-            key = by_name.get(name)
-            if key is None:
-                if self.is_strict:
-                    wrongs.append(Wrong((name,), _NO_KEY, value))
-            elif value is not None or key.is_required:
-                try:
-                    fields[key.field] = key.form.read(value)
-                except WrongError as error:
-                    wrongs += error.behind(name)
-        for key in self.keys:
-            if key.is_required and key.name not in data:
-                wrongs.append(Wrong((key.name,), "is missing"))
-        if wrongs:
-            raise WrongError(*wrongs)
-        return self.make(**fields)
+    def _made(self, fields: dict[str, object], **more: object) -> object:
+        return self.make(**more, **{self.by_name[key].field: said for key, said in fields.items()})
+
+    @cached_property
+    def _validator(self) -> SchemaValidator:
+        return SchemaValidator(self._schema)
+
+    @cached_property
+    def _schema(self) -> CoreSchema:
+        fields = {
+            key.name: core_schema.typed_dict_field(key.form.schema, required=key.is_required)
+            for key in self.keys
+        }
+        schema = core_schema.typed_dict_schema(
+            fields, extra_behavior="forbid" if self.is_strict else "ignore"
+        )
+        return core_schema.no_info_before_validator_function(self._without_empty, schema)
+
+    def _without_empty(self, data: Data) -> Data:
+        """Return a mapping without the optional keys under which nothing stands."""
+        if not isinstance(data, dict) or None not in data.values():
+            return data
+        needed = {key.name for key in self.keys if key.is_required}
+        return {name: said for name, said in data.items() if said is not None or name in needed}
 
 
 def _said(data: dict[str, Data]) -> dict[str, Data]:
@@ -195,23 +203,25 @@ _LANDMARK = RecordKind(
 )
 
 
-def _read_landmark(data: Data) -> object:
-    """Read a landmark; a bare label counts as one."""
-    return _LANDMARK.form.read({"label": data} if isinstance(data, str) else data)
-
-
 def _say_landmark(landmark: Landmark) -> Data:
     said = {key: value for key, value in _LANDMARK.write(landmark).items() if value is not None}
     return landmark.label if len(said) == 1 else cast("Data", said)
 
 
+# A bare label counts as a landmark.
+_LANDMARK_SCHEMA = core_schema.no_info_before_validator_function(
+    lambda data: {"label": data} if isinstance(data, str) else data, _LANDMARK.form.schema
+)
 PLACE = RecordKind(
     Waypoint,
     (
         Key("name", forms.WORDS, is_required=True),
         Key("description", forms.TEXT),
         Key("pose", _POSE.form, is_required=True),
-        *(Key(name, forms.list_of(Form(_read_landmark, _say_landmark))) for name in LANDMARK_KEYS),
+        *(
+            Key(name, forms.list_of(Form(_LANDMARK_SCHEMA, _say_landmark)))
+            for name in LANDMARK_KEYS
+        ),
         Key("geometric_features", forms.list_of(forms.WORDS)),
         _STAMP,
         _RECORDED_AT,
@@ -264,18 +274,22 @@ LISTS: Mapping[str, RecordKind] = {"waypoints": PLACE, "events": EVENT, "frames"
 
 def _read_version(value: Data) -> object:
     if value != str(FILE_VERSION):
-        raise wrong("is not a version that this mapspeak reads", value)
+        raise ValueError("is not a version that this mapspeak reads")
     return value
 
 
-_ANY = Form(lambda value: value, lambda value: value)
-_LIST = Form(lambda value: forms.list_of(_ANY).read(value or []), _ANY.write)
+_ANY = Form(core_schema.any_schema(), lambda value: value)
+_VERSION = Form(core_schema.no_info_plain_validator_function(_read_version), _ANY.write)
+_LIST_SCHEMA = forms.list_of(_ANY).schema
+_RECORDS = Form(
+    core_schema.no_info_before_validator_function(lambda said: said or [], _LIST_SCHEMA), _ANY.write
+)
 FILE = RecordKind(
     dict,
     (
-        Key("version", Form(_read_version, _ANY.write)),
+        Key("version", _VERSION),
         Key("map", forms.TEXT),
-        *(Key(name, _LIST) for name in LISTS),
+        *(Key(name, _RECORDS) for name in LISTS),
         Key("snapshot", _ANY),
     ),
 )

@@ -4,7 +4,7 @@ Reading and writing are synchronous and safe between processes and threads: a st
 but what it read last.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -127,11 +127,6 @@ class _FileRecords:
         self.document = document
 
     @property
-    def map_id(self) -> str | None:
-        """The map that the file says it is of."""
-        return self.document.map_id
-
-    @property
     def frames(self) -> Frames:
         """All of them."""
         return self.document.frames
@@ -157,11 +152,6 @@ class _FileRecords:
         """Write a record; return it as it reads."""
         self.document = self.document.with_record(record)
         return cast("OneRecord", self.document.find(list_key_of(record), key_of(record)))
-
-    def put_places(self, waypoints: Iterable[Waypoint]) -> None:
-        """Write many places."""
-        for waypoint in waypoints:
-            self.put(waypoint)
 
     def rename_place(self, former_key: str, waypoint: Waypoint) -> None:
         """Write a place where the one of another `name_key` was, which is removed."""
