@@ -15,6 +15,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    NavigationLook,
     RangeScan,
     RobotDescription,
     StampedPose,
@@ -83,6 +84,7 @@ class FakeRobot:
         self.scan: RangeScan | None = None
         self.n_stops = 0
         self.foreign_goals: tuple[GoalState, ...] = ()
+        self.navigation: tuple[NavigationLook, ...] = ()
         self.goals: dict[str, Pose] = {}
         self.ended: dict[str, GoalStatus] = {}
         self.map_was_asked_for = anyio.Event()
@@ -146,6 +148,9 @@ class FakeRobot:
 
     async def fetch_scan(self) -> RangeScan | None:
         return self.scan
+
+    async def fetch_navigation(self) -> tuple[NavigationLook, ...]:
+        return self.navigation
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         return self.foreign_goals

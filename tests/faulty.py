@@ -21,6 +21,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    NavigationLook,
     RangeScan,
     RobotDescription,
     StampedPose,
@@ -284,6 +285,9 @@ class FaultyRobot:
         if robot_goal_id not in self._goals:
             raise GoalError("Navigation does not know that goal.", hint="It was restarted.")
         return self._goals[robot_goal_id].status
+
+    async def fetch_navigation(self) -> tuple[NavigationLook, ...]:
+        return ()
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         return ()

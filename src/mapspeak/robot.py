@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 
 OLD_POSE_S = 3.0
@@ -171,6 +171,32 @@ class RangeScan:
             object.__setattr__(self, name, values)
 
 
+class NavigationPart(StrEnum):
+    """What a robot's navigation tells of itself."""
+
+    PLAN = "plan"
+    FOOTPRINT = "footprint"
+    GLOBAL_COSTMAP = "global_costmap"
+    LOCAL_COSTMAP = "local_costmap"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigationLook:
+    """What navigation told last of one part of itself.
+
+    Attributes:
+        age_s: By its stamp; None where nothing has come.
+        lines: In the map frame: the planned path, the footprint as a ring, or rings around what a
+            costmap closes to the middle of the robot.
+        unplaced_frame: The frame it was told in, where that is not joined to the map's.
+    """
+
+    part: NavigationPart
+    age_s: float | None
+    lines: tuple[tuple[Point, ...], ...] = ()
+    unplaced_frame: str = ""
+
+
 class GoalState(StrEnum):
     """How a drive stands; planned ones wait their turn, timed-out ones came no nearer."""
 
@@ -313,6 +339,9 @@ class Robot(Protocol):
         It is evidence on the side: it takes no longer than `SCAN_PATIENCE_S`, and no laser that is
         silent, late or turned on its side raises.
         """
+
+    async def fetch_navigation(self) -> tuple[NavigationLook, ...]:
+        """Return what navigation tells of path, footprint and costmaps; empty for nothing."""
 
     async def send_goal(self, goal: Pose) -> str:
         """Start a drive in the robot's navigation and return the id it is known by."""

@@ -16,8 +16,10 @@ from anyio.abc import Process
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from livepage import Live, find_free_address, serve_live, serve_page
+from mapspeak.geometry import Point
 from mapspeak.links.simulated import SoloRobot
 from mapspeak.memory import SemanticMapStore
+from mapspeak.robot import NavigationLook, NavigationPart
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.feed import ViewFeed
@@ -113,6 +115,25 @@ async def test_a_person_chooses_a_camera(tmp_path: Path) -> None:
         await page.get_by_label("Which camera").select_option("rear")
         async with page.expect_request("**/camera?*camera=rear"):
             await expect(page.locator("#camera")).to_be_visible()
+
+
+async def test_what_navigation_plans_is_a_layer_that_a_person_switches_on(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    path = (Point(1.5, 1.5), Point(3.0, 1.5))
+    robot.navigation = (NavigationLook(part=NavigationPart.PLAN, age_s=0.4, lines=(path,)),)
+    async with serve_live(tmp_path, robot) as live, browse(live.address) as page:
+        note, drawn = page.locator("#navigation"), page.locator('path[stroke="#009e73"]')
+        await expect(page.locator("#state")).to_contain_text("x 1.50")
+        await expect(note).to_be_hidden()
+        await page.hover(".leaflet-control-layers")
+        await page.get_by_label("navigation").check()
+        await expect(note).to_contain_text("planned path 1.5 m long")
+        await expect(drawn).to_have_count(1)
+        robot.navigation = ()
+        await expect(note).to_contain_text("publishes no planned path")
+        await expect(drawn).to_have_count(0)
+        await page.get_by_label("navigation").uncheck()
+        await expect(note).to_be_hidden()
 
 
 async def test_a_click_on_what_lies_there_notes_closes_renames_and_forgets(tmp_path: Path) -> None:

@@ -17,7 +17,14 @@ from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from livepage import next_of, serve_live
 from mapspeak.errors import ConfigError, LinkError, MapError
-from mapspeak.robot import CameraPicture, RobotDescription, StampedPose
+from mapspeak.geometry import Point
+from mapspeak.robot import (
+    CameraPicture,
+    NavigationLook,
+    NavigationPart,
+    RobotDescription,
+    StampedPose,
+)
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.safety.approvals import VALID_S
 from mapspeak.server.view.keys import PageKeys
@@ -226,6 +233,18 @@ async def test_what_no_mission_asks_is_not_answered(tmp_path: Path) -> None:
         answer = await live.command("answer", question="Q7", answer="yes")
         assert (answer.status_code, "No mission waits" in answer.text) == (409, True)
         assert (await live.command("answer", question="Q7", answer="")).status_code == 422
+
+
+async def test_a_page_draws_what_the_robots_navigation_tells(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    path = (Point(1.5, 1.5), Point(3.0, 1.5))
+    robot.navigation = (NavigationLook(part=NavigationPart.PLAN, age_s=0.4, lines=(path,)),)
+    async with serve_live(tmp_path, robot) as live:
+        told = (await live.http.get("/robots/robot/navigation")).json()
+    (plan,) = told["parts"]
+    assert (plan["part"], plan["lines"]) == ("plan", [[[1.5, 1.5], [3.0, 1.5]]])
+    assert plan["said"].endswith("0.4 s old")
+    assert "publishes no footprint" in told["said"]
 
 
 async def test_the_camera_is_shown_where_there_is_one(tmp_path: Path) -> None:

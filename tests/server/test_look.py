@@ -13,10 +13,10 @@ from PIL import Image
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.agents.driver import read_map_picture, read_map_text
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.pictures import PictureBook, TakenPicture
-from mapspeak.robot import Detection
+from mapspeak.robot import Detection, NavigationLook, NavigationPart
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S
 from served import MODES, connect, pictures_of, report_of, text_of
@@ -138,6 +138,37 @@ def test_the_robot_is_aimed_by_the_camera_ahead_however_wide_another_one_is() ->
         book.add(taken, b"", media_type="image/jpeg")
     assert book.half_view_rad == pytest.approx(math.radians(40))
     assert len(book.views) == 2
+
+
+async def test_what_the_robots_navigation_plans_is_drawn_on_request_with_its_age(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    path = (Point(1.5, 1.5), Point(1.5, 2.0), Point(3.0, 2.0))
+    robot.navigation = (
+        NavigationLook(part=NavigationPart.PLAN, age_s=0.4, lines=(path,)),
+        NavigationLook(part=NavigationPart.FOOTPRINT, age_s=None),
+        NavigationLook(part=NavigationPart.LOCAL_COSTMAP, age_s=2.0, unplaced_frame="odom"),
+    )
+    asked = {"layers": ["navigation"], "full": True}
+    async with connect(robot, tmp_path) as client:
+        usual = await client.call_tool("look_at_map", {"layers": ["rooms"], "full": True})
+        shown = await client.call_tool("look_at_map", asked)
+        robot.navigation = ()
+        nothing = await client.call_tool("look_at_map", asked)
+    assert "navigation" not in text_of(usual)
+    told = text_of(shown)
+    assert "planned path 2.0 m long, ends at x 3.00, y 2.00, 0.4 s old" in told
+    assert "footprint has told nothing yet" in told
+    assert "in the frame 'odom', which TF does not join to the map" in told
+    assert "it publishes no global costmap." in told
+    assert "the path green" in told
+    assert "publishes no planned path, no footprint" in text_of(nothing)
+    green = (0, 158, 115)
+    for result, is_drawn in ((shown, True), (nothing, False)):
+        png = base64.b64decode(pictures_of(result)[0].data)
+        pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+        assert (pixels == green).all(axis=2).any() == is_drawn
 
 
 async def test_what_the_robots_detector_reports_stands_beside_the_picture(tmp_path: Path) -> None:

@@ -198,3 +198,15 @@ def test_the_rear_camera_sees_what_the_front_one_sees_after_half_a_turn() -> Non
     behind = Simulation(load_world("flat_1"), seed=1, start=Pose(2.0, 2.0, 0.0))
     differs = ahead.take_picture() != behind.take_picture("rear")
     assert differs.mean() < 0.01
+
+
+def test_the_path_that_is_driven_is_told_until_the_drive_ends(warehouse: World) -> None:
+    simulation = Simulation(warehouse, seed=0)
+    assert not simulation.planned_path
+    goal = simulation.pose_in_map @ Pose(1.0, 0.0)
+    simulation.start_goal(goal)
+    step_for(simulation, 0.5)
+    *_, end = simulation.planned_path
+    assert end.distance_to(goal.point) < 0.1
+    simulation.stop()
+    assert not simulation.planned_path

@@ -1,6 +1,7 @@
 """The simulated robot behind the port, on a virtual clock or paced to real time."""
 
 import io
+import math
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from enum import StrEnum
@@ -11,7 +12,7 @@ import anyio.to_thread
 import numpy as np
 from PIL import Image
 
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.links.simulatedskills import build_skills
 from mapspeak.robot import (
     SCAN_PATIENCE_S,
@@ -19,6 +20,8 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    NavigationLook,
+    NavigationPart,
     RangeScan,
     Robot,
     RobotDescription,
@@ -43,6 +46,8 @@ EPSILON_S = 1e-6
 LATE_S = 1.0
 """A machine that falls this far behind the wall clock is not rushed to catch up."""
 JPEG_QUALITY = 85
+N_CORNERS = 16
+"""Of the polygon that stands for a round footprint."""
 
 T = TypeVar("T")
 
@@ -141,6 +146,22 @@ class SimulatedRobot:
                     stamp_s=scan.stamp_s,
                 )
         return None
+
+    async def fetch_navigation(self) -> tuple[NavigationLook, ...]:
+        """Return the path that is driven and the round footprint; it plans on no costmap."""
+        async with self._turn:
+            path, here = self._simulation.planned_path, self._simulation.pose_in_map
+        turns_rad = np.linspace(0.0, math.tau, N_CORNERS + 1).tolist()
+        rim = Point(BODY_RADIUS_M, 0.0)
+        ring = ((here @ Pose(0.0, 0.0, turn_rad)).transform(rim) for turn_rad in turns_rad)
+        return (
+            NavigationLook(
+                part=NavigationPart.PLAN,
+                age_s=0.0 if path else None,
+                lines=(path,) if path else (),
+            ),
+            NavigationLook(part=NavigationPart.FOOTPRINT, age_s=0.0, lines=(tuple(ring),)),
+        )
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         """Return nothing: no other client can send this robot anywhere."""

@@ -17,6 +17,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    NavigationLook,
     RangeScan,
     Robot,
     RobotDescription,
@@ -119,6 +120,10 @@ class GuardedRobot:
     async def fetch_scan(self) -> RangeScan | None:
         """Return what the laser meets now; None without one."""
         return await self._robot.fetch_scan()
+
+    async def fetch_navigation(self) -> tuple[NavigationLook, ...]:
+        """Return what navigation tells of path, footprint and costmaps."""
+        return await self._robot.fetch_navigation()
 
     async def send_goal(self, goal: Pose) -> str:
         """Start a drive that the policy allows, and return the id it is known by.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import ConfigError, GoalError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Detection, GoalState, GoalStatus
 from mapspeak.simulator.camera.camera import CAMERAS, FRONT, PinholeCamera, SimulatedDetector
 from mapspeak.simulator.robot.controller import Obstacles
@@ -144,6 +144,11 @@ class Simulation:
         return self._detector.detect(view)
 
     # --- driving ---
+
+    @property
+    def planned_path(self) -> tuple[Point, ...]:
+        """The rest of the path that is driven, in the map; empty while none is."""
+        return self._navigator.path_left
 
     def start_goal(self, goal: Pose) -> int:
         """Send the robot to a pose in the map and return the drive's id; an earlier drive ends."""

@@ -205,12 +205,21 @@ def outline_unpictured(grid: OccupancyGrid, shown: Mask) -> list[FloatArray]:
         shown: From `mask_pictured`.
     """
     beside = cv2.dilate(grid.occupied.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    left = (beside & grid.free & ~shown).astype(np.uint8)
-    contours, _ = cv2.findContours(left, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+    return trace_outlines(grid, beside & grid.free & ~shown, least_m=LEAST_OUTLINE_M)
+
+
+def trace_outlines(grid: OccupancyGrid, cells: Mask, *, least_m: float) -> list[FloatArray]:
+    """Return rings around some cells of a grid, each of shape (n, 2), in metres.
+
+    Args:
+        least_m: Shorter ones are left out.
+    """
+    marked = cells.astype(np.uint8)
+    contours, _ = cv2.findContours(marked, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
     return [
         grid.points_at(*contour[:, 0, ::-1].T.astype(np.intp))
         for contour in contours
-        if cv2.arcLength(contour, closed=True) * grid.resolution_m >= LEAST_OUTLINE_M
+        if cv2.arcLength(contour, closed=True) * grid.resolution_m >= least_m
     ]
 
 

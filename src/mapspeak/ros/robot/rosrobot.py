@@ -12,6 +12,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    NavigationLook,
     PoseDoubt,
     RangeScan,
     RobotDescription,
@@ -29,6 +30,7 @@ from mapspeak.ros.robot.driving import (
     GoalTopicDriver,
 )
 from mapspeak.ros.robot.maps import MapSubscriber
+from mapspeak.ros.robot.plans import NavigationListener
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from mapspeak.ros.robot.sensors import Laser, RosCamera, find_camera_yaw_rad, no_camera
 from mapspeak.ros.robot.stopping import Brake, stop_everything
@@ -61,6 +63,7 @@ class RosRobot:
         self._cameras: dict[str, RosCamera] = {}
         self._laser = Laser(connection, profile, frames=frames, clock=clock)
         self._poses = PoseKeeper(connection, profile, frames)
+        self._navigation = NavigationListener(connection, lambda: self.profile, frames, clock)
         self._brake = self._build_brake()
         self._driver = self._build_driver()
         watch.is_driving = self._is_driving
@@ -150,6 +153,11 @@ class RosRobot:
     async def fetch_scan(self) -> RangeScan | None:
         """Return a scan of the laser that arrives after it was asked for; None where none does."""
         return await self._laser.fetch(self._poses)
+
+    async def fetch_navigation(self) -> tuple[NavigationLook, ...]:
+        """Return what Nav2 or move_base publishes of path, footprint and costmaps."""
+        await self.connection.wait_until_connected()
+        return await self._navigation.fetch()
 
     async def send_goal(self, goal: Pose) -> str:
         """Start a drive; return when navigation has taken or refused it."""

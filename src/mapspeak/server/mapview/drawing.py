@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point
+from mapspeak.robot import NavigationPart
 from mapspeak.server.text.wording import list_some, say_area
 from mapspeak.server.text.world.look import Layer, MapLook, MapView
 from mapspeak.spatial import OccupancyGrid
@@ -103,6 +104,7 @@ def draw_world(view: MapView) -> WorldPicture:
             zones=_closed_areas(view),
             lines=(
                 *_unseen_walls(view),
+                *_navigation(view),
                 *(_way_to_first_frontier(world) if look.layers >= WITH_PATH else ()),
             ),
             marks=(
@@ -121,6 +123,11 @@ def draw_world(view: MapView) -> WorldPicture:
         parts.append(f"Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot.")
     if view.unseen is not None:
         parts.append("Purple lines are walls that no picture shows.")
+    if view.navigation:
+        parts.append(
+            "Of the robot's navigation: the path green, the footprint vermilion, around what the "
+            "middle of the robot may not touch orange (global costmap) and sky blue (local)."
+        )
     if Layer.DOORS in look.layers and not is_detailed:
         parts.append("An overview without doors and areas: zoom in with around and radius_m.")
     return WorldPicture(png=picture.png, caption=" ".join(parts))
@@ -229,6 +236,23 @@ def _unseen_walls(view: MapView) -> tuple[Line, ...]:
     return tuple(
         Line(points=tuple(Point(x, y) for x, y in line.tolist()), colour=Colour.PURPLE, width_px=5)
         for line in unseen
+    )
+
+
+NAVIGATION_COLOURS = {
+    NavigationPart.PLAN: Colour.GREEN,
+    NavigationPart.FOOTPRINT: Colour.VERMILION,
+    NavigationPart.GLOBAL_COSTMAP: Colour.ORANGE,
+    NavigationPart.LOCAL_COSTMAP: Colour.SKY,
+}
+
+
+def _navigation(view: MapView) -> tuple[Line, ...]:
+    return tuple(
+        Line(points=line, colour=NAVIGATION_COLOURS[look.part])
+        for look in view.navigation or ()
+        for line in look.lines
+        if len(line) > 1
     )
 
 

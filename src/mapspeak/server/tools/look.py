@@ -18,9 +18,7 @@ from mapspeak.server.tools.sightings import Camera, look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
-Layers = Annotated[
-    list[Layer] | None, Field(description="what to draw and list; else all but unseen")
-]
+Layers = Annotated[list[Layer] | None, Field(description="what to draw; else all but the last two")]
 Around = Annotated[
     str | None,
     Field(description='zoom in on an id, a name, "robot" or "x, y"', max_length=200),
@@ -66,10 +64,13 @@ class LookTools:
         place for the other tools.
         """
         world, taken = await self._session.fetch_world_model(), self._session.pictures.views
+        navigation = None
+        if Layer.NAVIGATION in (layers or ()):
+            navigation = await self._session.robot.fetch_navigation()
 
         def see() -> MapView:
             look = look_at(world, layers=layers, around=around, radius_m=radius_m, up=up)
-            return view_of(world, look, taken)
+            return view_of(world, look, taken, navigation)
 
         view = await self._session.compute(see)
         client = find_reader(context) if view.look == MapLook() else None

@@ -17,8 +17,10 @@ from pydantic import BaseModel, ConfigDict
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose
+from mapspeak.robot import NavigationLook
 from mapspeak.server.text.wording import say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
+from mapspeak.server.text.world.maps import NAVIGATION_PARTS, say_navigation_part
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 
@@ -132,6 +134,26 @@ class QuestionView(ViewPart):
     said: str
     answers: tuple[str, ...] = ()
     picture: str = ""
+
+
+class NavigationView(ViewPart):
+    """What the robot's navigation tells of one part of itself.
+
+    Attributes:
+        said: Its state in words, with its age.
+        lines: The planned path, the footprint, or rings around what a costmap closes.
+    """
+
+    part: str
+    said: str
+    lines: list[list[Spot]]
+
+    @classmethod
+    def of(cls, look: NavigationLook) -> "NavigationView":
+        """Round to the centimetre."""
+        lines = [[(round(at.x, 2), round(at.y, 2)) for at in line] for line in look.lines]
+        said = f"{NAVIGATION_PARTS[look.part]} {say_navigation_part(look)}"
+        return cls(part=look.part.value, said=said, lines=lines)
 
 
 class MissionsView(ViewPart):

@@ -22,7 +22,9 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mapspeak.errors import ConfigError, LinkError, MapspeakError
+from mapspeak.server.text.world.maps import say_navigation
 from mapspeak.server.view.commands import PersonCommands
+from mapspeak.server.view.document import NavigationView
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import NOBODY, PageKeys
 from mapspeak.server.view.pages import find_leaflet_files, find_page_files, link_page
@@ -115,6 +117,7 @@ def build_site(feeds: Mapping[str, ViewFeed], keys: PageKeys) -> ASGIApp:
         Route("/robots/{robot}/events", site.stream),
         Route("/robots/{robot}/tiles/{row:int}/{col:int}/{name}.png", site.show_tile),
         Route("/robots/{robot}/camera", site.show_camera),
+        Route("/robots/{robot}/navigation", site.show_navigation),
         Route("/robots/{robot}/calls/{number:int}/{index:int}", site.show_picture),
         Route("/robots/{robot}/questions/{question}", site.show_question),
         Route("/unlock", site.unlock, methods=["POST"]),
@@ -180,6 +183,17 @@ class LiveSite:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
         fresh = {"cache-control": "no-store"}
         return Response(picture.data, media_type=picture.media_type, headers=fresh)
+
+    async def show_navigation(self, request: Request) -> Response:
+        """Answer with what the robot's navigation tells of path, footprint and costmaps."""
+        session = self._find(request).session
+        try:
+            looks = await session.robot.fetch_navigation()
+        except LinkError as error:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
+        parts = [NavigationView.of(look).model_dump() for look in looks]
+        fresh = {"cache-control": "no-store"}
+        return JSONResponse({"said": say_navigation(looks), "parts": parts}, headers=fresh)
 
     async def show_picture(self, request: Request) -> Response:
         """Answer with a picture that a client was given."""

@@ -112,6 +112,13 @@ class Navigator:
         self._watch_progress(senses.now_s, follower.distance_left_m)
         return velocity
 
+    @property
+    def path_left(self) -> tuple[Point, ...]:
+        """The rest of the path that it follows; empty while it follows none."""
+        if self._follower is None:
+            return ()
+        return tuple(Point(x, y) for x, y in self._follower.points_left.tolist())
+
     # --- planning ---
 
     def _plan(self, senses: Senses, goal: Pose) -> None:

@@ -13,6 +13,7 @@ from mapspeak.driving.exploration.progress import find_refused
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import find_place
+from mapspeak.robot import NavigationLook
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
@@ -49,9 +50,11 @@ class Layer(StrEnum):
     PATH = "path"
     UNSEEN = "unseen"
     """The walls that no picture shows; only on request."""
+    NAVIGATION = "navigation"
+    """Path, footprint and costmaps of the robot's own navigation; only on request."""
 
 
-USUAL_LAYERS = frozenset(Layer) - {Layer.UNSEEN}
+USUAL_LAYERS = frozenset(Layer) - {Layer.UNSEEN, Layer.NAVIGATION}
 
 
 class Up(StrEnum):
@@ -156,6 +159,7 @@ class MapView:
         places: Remembered ones, nearest first.
         closed: Areas that are closed to the robot now, in the order of the policy.
         unseen: Walls that no picture shows; None where not asked for.
+        navigation: What the robot's navigation tells of itself; None where not asked for.
     """
 
     world: WorldModel
@@ -168,13 +172,20 @@ class MapView:
     places: MapPart[RememberedPlace]
     closed: MapPart[ClosedArea]
     unseen: UnseenWalls | None = None
+    navigation: Sequence[NavigationLook] | None = None
 
 
-def view_of(world: WorldModel, look: MapLook, pictures: Sequence[CameraView] = ()) -> MapView:
+def view_of(
+    world: WorldModel,
+    look: MapLook,
+    pictures: Sequence[CameraView] = (),
+    navigation: Sequence[NavigationLook] | None = None,
+) -> MapView:
     """Return the shown part of a world model.
 
     Args:
         pictures: Where pictures of this map were taken.
+        navigation: What the robot's navigation told last, where that was asked.
     """
 
     def path_or_far(point: Point | None) -> float:
@@ -210,6 +221,7 @@ def view_of(world: WorldModel, look: MapLook, pictures: Sequence[CameraView] = (
             [area for area in world.map.areas if _shows_some(look, area)], MOST_CLOSED
         ),
         unseen=_find_unseen(world, pictures) if Layer.UNSEEN in look.layers else None,
+        navigation=navigation,
     )
 
 

@@ -2,7 +2,9 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 
+from mapspeak.robot import NavigationLook, NavigationPart
 from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierMerit,
@@ -189,3 +191,35 @@ def _count_refused(report: FrontierReport) -> str:
     return ", ".join(
         f"{by_reason[reason]} {REFUSED[reason]}" for reason in most_first if by_reason[reason]
     )
+
+
+NAVIGATION_PARTS = {
+    NavigationPart.PLAN: "planned path",
+    NavigationPart.FOOTPRINT: "footprint",
+    NavigationPart.GLOBAL_COSTMAP: "global costmap",
+    NavigationPart.LOCAL_COSTMAP: "local costmap",
+}
+
+
+def say_navigation(looks: Sequence[NavigationLook]) -> str:
+    """Return what the robot's navigation tells of itself, a phrase a part, with its age."""
+    told = {look.part: look for look in looks}
+    silent = [name for part, name in NAVIGATION_PARTS.items() if part not in told]
+    said = [f"{NAVIGATION_PARTS[look.part]} {say_navigation_part(look)}" for look in looks]
+    said += [f"it publishes no {', no '.join(silent)}"] if silent else []
+    return f"The robot's navigation: {'; '.join(said)}."
+
+
+def say_navigation_part(look: NavigationLook) -> str:
+    """Return what one part tells now."""
+    if look.age_s is None:
+        return "has told nothing yet"
+    if look.unplaced_frame:
+        return f"is told in the frame {look.unplaced_frame!r}, which TF does not join to the map"
+    what = ""
+    if look.part is NavigationPart.PLAN and look.lines:
+        points = look.lines[0]
+        length_m = sum(one.distance_to(other) for one, other in pairwise(points))
+        end = points[-1]
+        what = f"{length_m:.1f} m long, ends at x {end.x:.2f}, y {end.y:.2f}, "
+    return f"{what}{look.age_s:.1f} s old"

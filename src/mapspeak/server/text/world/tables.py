@@ -31,6 +31,7 @@ from mapspeak.server.text.world.look import (
 from mapspeak.server.text.world.maps import (
     say_doubtful_door,
     say_merits,
+    say_navigation,
     say_ranks,
     say_refusal,
     say_unsure,
@@ -99,6 +100,8 @@ def _summary(view: MapView, told: Told) -> str:
         lines += _say_extremes(view)
     if view.unseen is not None:
         lines.append(f"Pictures show {view.unseen.pictured_ratio:.0%} of the walls in sight.")
+    if view.navigation is not None:
+        lines.append(say_navigation(view.navigation))
     if told.is_first:
         lines.append(_say_map(world))
     else:

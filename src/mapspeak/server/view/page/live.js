@@ -79,6 +79,29 @@ async function showLive() {
   setInterval(() => { showState(); calls.showAges(); }, 1000);
 
   watchCamera(base, () => isConnected);
+  watchNavigation(base, map);
+}
+
+/** Draw what navigation plans while its layer is on; the next is asked for when the last has come.
+ * @param {string} base @param {MapView} map */
+function watchNavigation(base, map) {
+  let isWaiting = false;
+  const note = byId("navigation");
+  map.offerNavigation();
+  setInterval(async () => {
+    note.hidden = !map.showsNavigation;
+    if (isWaiting || note.hidden || document.visibilityState !== "visible") return;
+    isWaiting = true;
+    try {
+      const answer = await fetch(`${base}/navigation`);
+      const told = answer.ok ? await answer.json() : { said: await answer.text(), parts: [] };
+      map.showNavigation(told.parts);
+      note.textContent = legible(told.said);
+    } catch {
+      note.textContent = "The server does not answer.";
+    }
+    isWaiting = false;
+  }, 1000);
 }
 
 /** Show the camera: the next picture is asked for when the one before has come.

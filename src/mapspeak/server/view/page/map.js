@@ -16,6 +16,8 @@ const NAMES_FROM_PX_PER_M = 12;
 /** From here on doors, frontiers, places and things have their names beside them. */
 const ALL_NAMES_FROM_PX_PER_M = 45;
 const MARKS = { rooms: "▰", closed: "▰", doors: "●", frontiers: "○", things: "●", places: "●", trail: "—", path: "┅" };
+/** Colours of the parts of the robot's navigation, as in the picture of look_at_map. @type {Record<string, string>} */
+const NAVIGATION = { plan: "#009e73", footprint: "#d55e00", global_costmap: "#e69f00", local_costmap: "#56b4e9" };
 /** Places no farther apart share their name on the map. */
 const STACK_M = 0.5;
 const TRAIL_M = 0.25;
@@ -71,10 +73,10 @@ class MapView {
     this.tilePane = L.layerGroup().addTo(this.map);
     const layer = () => L.layerGroup().addTo(this.map);
     this.layers = { rooms: layer(), closed: layer(), doors: layer(), frontiers: layer(),
-      things: layer(), places: layer(), trail: layer(), path: layer(), robot: layer() };
+      things: layer(), places: layer(), trail: layer(), path: layer(), robot: layer(), navigation: L.layerGroup() };
     const named = Object.entries(MARKS).map(([name, mark]) =>
       [`<span class="mark ${name}">${mark}</span> ${name}`, this.layers[/** @type {keyof typeof MARKS} */ (name)]]);
-    L.control.layers(null, Object.fromEntries(named)).addTo(this.map);
+    this.switches = L.control.layers(null, Object.fromEntries(named)).addTo(this.map);
     this.addWholeButton();
     // The view grows with the map until a person moves it.
     this.isFollowing = true;
@@ -296,6 +298,27 @@ class MapView {
     });
     this.cone.setLatLngs(fov_deg ? [at, ...rim] : []);
     return at;
+  }
+
+  /** Let a person switch on what the robot's navigation tells of itself. */
+  offerNavigation() {
+    this.switches.addOverlay(this.layers.navigation, '<span class="mark navigation">▱</span> navigation');
+  }
+
+  /** Draw what the robot's navigation tells of itself. @param {{part: string, said: string, lines: number[][][]}[]} parts */
+  showNavigation(parts) {
+    const layer = this.layers.navigation.clearLayers();
+    for (const { part, said, lines } of parts) {
+      for (const line of lines) {
+        L.polyline(line.map((at) => this.place(at)), { color: NAVIGATION[part], weight: 2 })
+          .bindTooltip(plain(said), { sticky: true }).addTo(layer);
+      }
+    }
+  }
+
+  /** True while that layer is switched on. */
+  get showsNavigation() {
+    return this.map.hasLayer(this.layers.navigation);
   }
 
   /** Tell of a click. @param {{lat: number, lng: number}} at @param {Item | null} item */
