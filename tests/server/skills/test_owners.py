@@ -5,12 +5,17 @@ from typing import Any
 
 import pytest
 
-from exposing import NODE, exposed, tool_system
+from exposing import NODE, exposed, tool_system, watched
+from fakes import FakeRobot, two_rooms
 from guarding import make_guard
+from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.hub import Topic
 from mapspeak.safety import Approval, Otherwise, Policy
 from mapspeak.skills.skillsfile import OwnersEntry, load_skills
+from rosbridge_robot import ScriptedRobot
+from rosbridge_script import running
+from rosserved import QUICK
 
 pytestmark = pytest.mark.anyio
 both = pytest.mark.parametrize("dialect", Dialect)
@@ -108,3 +113,40 @@ async def test_a_persons_word_lets_a_skill_publish_what_is_usually_denied(tmp_pa
     assert "run the skill place_robot (x=2.5)" in asked
     assert [each["pose"]["pose"]["position"]["x"] for each in poses] == [2.5]
     assert "A person must agree" in again
+
+
+def at(x: float) -> dict[str, Any]:
+    return {
+        "header": {"frame_id": "map"},
+        "pose": {"position": {"x": x, "y": 1.0}, "orientation": {"w": 1.0}},
+    }
+
+
+async def test_nav2_itself_drives_to_waypoints_once_a_person_agrees(tmp_path: Path) -> None:
+    scripted = ScriptedRobot(actions=("/follow_waypoints",))
+    kind = {"type": "nav2_msgs/action/FollowWaypoints"}
+    scripted.services["/rosapi/action_type"] = lambda _: kind
+    guard = make_guard(tmp_path, Policy(approval=Approval(otherwise=Otherwise.QUEUE)))
+    async with (
+        running(scripted.server) as server,
+        open_client(RobotAddress(url=server.url), patience=QUICK) as client,
+        watched(
+            FakeRobot(two_rooms()),
+            client,
+            tmp_path,
+            expose=(),
+            guard=guard,
+            skills=load_skills(Path("nav2")),
+        ) as caller,
+    ):
+        poses = [at(1.0), at(2.0)]
+        asked = await caller.refuse("follow_waypoints", poses=poses)
+        (request,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(request)
+        text = await caller.ask("follow_waypoints", poses=poses, wait_s=0)
+        await scripted.until(lambda: scripted.goals)
+    assert "A person must agree" in asked
+    assert "running" in text
+    ((_, operation),) = scripted.goals
+    assert operation["action"] == "/follow_waypoints"
+    assert [each["pose"]["position"]["x"] for each in operation["args"]["poses"]] == [1.0, 2.0]
