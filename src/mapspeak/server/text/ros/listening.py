@@ -11,7 +11,7 @@ import anyio
 from mapspeak.ros.census import Census, Nodes
 from mapspeak.ros.hearing import Heard
 from mapspeak.ros.messages.fields import Dialect, Message, find_stamp
-from mapspeak.ros.port import EndQuality, RosConnection, RosGraph, TopicQuality
+from mapspeak.ros.port import EndQuality, NodeLinks, OwnEnds, RosConnection, RosGraph, TopicQuality
 from mapspeak.server.text.wording import list_some
 
 LATE_PERIODS = 3.0
@@ -116,6 +116,11 @@ def say_silence(heard: Heard) -> str:
     return f"nothing came in the {heard.known_for_s:.1f} s since we listen"
 
 
+def say_silent(heard: Heard, publishers: Nodes) -> str:
+    """Say for how long nothing has come, and from whom it should."""
+    return f"SILENT, {say_silence(heard)}; published by {say_nodes(publishers)}"
+
+
 def say_loss(connection: RosConnection, *, since_s: float) -> str:
     """Say that the connection is lost, or was lost after a moment; empty where it held.
 
@@ -141,7 +146,7 @@ def say_loss(connection: RosConnection, *, since_s: float) -> str:
 # --- who
 
 
-def mark_ours(names: Iterable[str], ours: Collection[str | None]) -> list[str]:
+def _mark_ours(names: Iterable[str], ours: Collection[str | None]) -> list[str]:
     """Return names, with a mark on those that are our own doing."""
     return [f"{name} (mapspeak)" if name in ours else name for name in names]
 
@@ -149,14 +154,45 @@ def mark_ours(names: Iterable[str], ours: Collection[str | None]) -> list[str]:
 def say_nodes(nodes: Nodes) -> str:
     """Name nodes, with a mark on ours."""
     named = sorted((*nodes.others, *filter(None, [nodes.ours])))
-    return list_some(mark_ours(named, (nodes.ours,)), most=MOST_NODES) or "nobody"
+    return list_some(_mark_ours(named, (nodes.ours,)), most=MOST_NODES) or "nobody"
 
 
-def count_nodes(nodes: Nodes) -> str:
-    """Say how many others there are, and whether we are there too."""
+def say_senders(topic: str, publishers: Nodes) -> str:
+    """Name the publishers of a topic, of which several may send one thing."""
+    is_open = len(publishers.others) > 1
+    untold = " (which of them sends which is not told)" if is_open else ""
+    return f"{topic} published by: {say_nodes(publishers)}{untold}"
+
+
+def say_ends(publishers: Nodes, hearers: Nodes) -> str:
+    """Name the nodes at both ends of a topic."""
+    return f"published by: {say_nodes(publishers)}\nheard by: {say_nodes(hearers)}"
+
+
+def count_ends(census: Census, topic: str) -> str:
+    """Say how many nodes are at both ends of a topic, and whether we are there too."""
+    publishers, hearers = census.publishers_of(topic), census.hearers_of(topic)
+    return f"published by {_count(publishers)}, heard by {_count(hearers)}"
+
+
+def _count(nodes: Nodes) -> str:
     if nodes.ours is None:
         return str(len(nodes.others) or "nobody")
     return f"{len(nodes.others)} and mapspeak" if nodes.others else "mapspeak alone"
+
+
+def say_node(name: str, links: NodeLinks, own: OwnEnds) -> str:
+    """Say what a node publishes, hears and serves, with a mark on what it does for us."""
+    is_ours = bool(own.node) and name.endswith(f"/{own.node}")
+    told = {
+        "publishes": _mark_ours(links.publishes, own.publishes if is_ours else ()),
+        "hears": _mark_ours(links.subscribes, own.hears if is_ours else ()),
+        "serves": links.serves,
+    }
+    lines = [
+        f"{does}: {list_some(each, most=MOST_NAMED) or 'nothing'}" for does, each in told.items()
+    ]
+    return "\n".join([name, *lines])
 
 
 def say_quality(quality: TopicQuality | None, dialect: Dialect, link: str) -> list[str]:

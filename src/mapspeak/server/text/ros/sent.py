@@ -1,16 +1,19 @@
 """What became of goals and publications, in words."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import anyio
 
+from mapspeak.errors import LinkError
+from mapspeak.ros.actions import ActionClient
 from mapspeak.ros.activity import ActionGoal, ActionState
+from mapspeak.ros.census import Nodes
 from mapspeak.ros.definitions.types import Field
 from mapspeak.ros.port import RosConnection
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.ros.listening import say_loss
+from mapspeak.server.text.ros.listening import say_loss, say_nodes
 from mapspeak.server.text.ros.refusals import STOP
-from mapspeak.server.text.ros.values import cut, show_message
+from mapspeak.server.text.ros.values import cut, show_message, show_value
 from mapspeak.server.text.ros.views import view_fields
 from mapspeak.server.text.wording import say_count
 
@@ -27,6 +30,8 @@ UNANSWERED = (
 )
 GOES_ON = "It goes on. {ros_goal_status} waits for it, {ros_cancel_goal} ends it."
 MOST_LISTED = 20
+READ_AT_START = "A node of ROS 1 that runs may notice only when it is started again."
+NO_TYPE_TOLD = "(its type is not told)"
 UNTIL_STOPPED = " until the robot was stopped"
 UNTIL_DRIVE = " until {goal_id} began, which drives the robot now"
 
@@ -60,8 +65,16 @@ def say_goal(
     return cut("\n".join(filter(None, parts)))
 
 
-def say_goals(lines: Sequence[str], loss: str) -> str:
-    """Return the lines of the latest goals that an action server knows, under their number."""
+def say_goals(client: ActionClient, handles: Mapping[str, str], loss: str) -> str:
+    """Return the latest goals that an action server knows, under their number.
+
+    Args:
+        client: Of the action.
+        handles: Of goals that were sent with the tools, by their ids.
+        loss: What is said of a lost connection.
+    """
+    ours = {at: f"ours, {handles.get(goal.id, 'of a drive')}" for at, goal in client.ours.items()}
+    lines = [f"{at}: {state}, {ours.get(at, 'not ours')}" for at, state in client.listed.items()]
     head = f"{say_count(len(lines), 'goal')}, by the server's ids:"
     return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *filter(None, [loss])])
 
@@ -80,3 +93,26 @@ def say_going_on(left_s: float | None) -> str:
     if left_s is None:
         return ""
     return f"Another publication goes on there for {left_s:.1f} s. {lead(STOP)}".rstrip()
+
+
+def say_hearers(hearers: Nodes | LinkError) -> str:
+    """Say who heard what was published."""
+    if isinstance(hearers, LinkError):
+        return f"Who heard it is not known: {hearers.message}"
+    return f"Heard by: {say_nodes(hearers)}."
+
+
+def say_set(node: str, parameter: str, before: object, after: object, notes: Sequence[str]) -> str:
+    """Say what a parameter was and is now, and what is to be noted of that."""
+    said = f"{parameter} of {node} was {show_value(before)}, is {show_value(after)} now."
+    return " ".join([said, *filter(None, notes)])
+
+
+def say_deleted(node: str, parameter: str) -> str:
+    """Say that a parameter is gone."""
+    return f"{parameter} of {node} is deleted."
+
+
+def say_new(near: Sequence[str]) -> str:
+    """Say that a parameter was not there, and which one may have been meant."""
+    return f"It is new{f': the nearest that it had is {near[0]}' if near else ''}."

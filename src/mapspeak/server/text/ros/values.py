@@ -25,6 +25,7 @@ KINDS = (
     "bytes", "bools", "integers", "doubles", "strings",
 )  # fmt: skip
 """By rcl_interfaces/ParameterType."""
+PLAIN = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
 
 
 def cut(text: str, *, most: int = LONGEST_ANSWER) -> str:
@@ -148,3 +149,8 @@ def say_descriptor(entry: Mapping[str, Any]) -> str:
     texts = (entry.get("description"), entry.get("additional_constraints"))
     parts += [show_value(text) for text in texts if text]
     return f" ({', '.join(parts)})" if parts else ""
+
+
+def say_kind(value: object) -> str:
+    """Return the kind of a parameter's value."""
+    return PLAIN.get(type(value), "a list or a table")

@@ -10,7 +10,7 @@ from mapspeak.errors import LinkError
 from mapspeak.safety import Act
 from mapspeak.server.text.ros.listening import list_page, say_loss
 from mapspeak.server.text.ros.refusals import ONE_OF_BOTH
-from mapspeak.server.text.ros.sent import say_goal, say_goals
+from mapspeak.server.text.ros.sent import NO_TYPE_TOLD, say_goal, say_goals
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
@@ -57,7 +57,7 @@ class ActionTools:
                 type_name = await self._inquiry.fetch_action_type(name)
                 said = await self._inquiry.say_type(type_name, kind="action")
             except LinkError:
-                said = "(its type is not told)"
+                said = NO_TYPE_TOLD
             lines[name] = f"{name} {said}"
         return list_page("actions", lines, filter, page)
 
@@ -116,8 +116,9 @@ class ActionTools:
         Use it to wait for the end; with an action it lists the goals its server knows.
         """
         if action is not None:
-            lines, heard_s = await self._goals.list_goals(full_name(action))
-            return say_goals(lines, say_loss(self._inquiry.connection, since_s=heard_s))
+            client, handles = await self._goals.list_goals(full_name(action))
+            loss = say_loss(self._inquiry.connection, since_s=client.listed_s)
+            return say_goals(client, handles, loss)
         job = self._goals.find(goal_id)
         await self._goals.wait(job, wait_s=wait_s)
         return self._say(job)

@@ -126,23 +126,11 @@ class ActionBook:
             await goal.wait_until_over(within_s=self._inquiry.connection.patience.end_s)
         return n_cancelled
 
-    async def list_goals(self, action: str) -> tuple[list[str], float]:
-        """Return a line for each goal that an action server knows, and when its list came.
-
-        The time is that of the event loop's clock.
-        """
+    async def list_goals(self, action: str) -> tuple[ActionClient, dict[str, str]]:
+        """Return what knows all goals of an action server, and our handles by the goals' ids."""
         client = await self._find_client(action)
         await client.wait_for_list()
-        handles = {job.goal.id: job.handle for job in self._jobs.values()}
-        ours = {
-            server_id: f"ours, {handles.get(goal.id, 'of a drive')}"
-            for server_id, goal in client.ours.items()
-        }
-        lines = [
-            f"{goal_id}: {state}, {ours.get(goal_id, 'not ours')}"
-            for goal_id, state in client.listed.items()
-        ]
-        return lines, client.listed_s
+        return client, {job.goal.id: job.handle for job in self._jobs.values()}
 
     async def _find_client(self, action: str) -> ActionClient:
         known = self._inquiry.connection.started.actions.get(action)

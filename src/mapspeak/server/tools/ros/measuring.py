@@ -12,7 +12,7 @@ from mapspeak.ros.definitions.sizes import measure_message
 from mapspeak.ros.hearing import hear_frames
 from mapspeak.ros.messages.fields import Message
 from mapspeak.server.text.ros.frames import say_frames, say_transform
-from mapspeak.server.text.ros.listening import say_measured, say_nodes, say_silence
+from mapspeak.server.text.ros.listening import say_measured, say_senders, say_silent
 from mapspeak.server.text.ros.refusals import refuse_name
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.tools.ros.goals import RosAccess
@@ -61,7 +61,7 @@ class MeasuringTools:
             n_bytes = await self._measure_size(type_name, heard.messages[-1])
             return say_measured(heard, now_s=self._session.robot.now_s, n_bytes=n_bytes)
         publishers = await fetch_publishers(self._inquiry.connection, name)
-        return f"SILENT, {say_silence(heard)}; published by {say_nodes(publishers)}"
+        return say_silent(heard, publishers)
 
     async def _measure_size(self, type_name: str, message: Message) -> int | None:
         try:
@@ -95,10 +95,5 @@ class MeasuringTools:
             outer, inner = in_frame.strip("/"), frame.strip("/")
             return say_transform(heard, outer=outer, inner=inner, now_s=now_s, heard_s=heard_s)
         tree = say_frames(list(heard.links.values()), now_s=now_s, heard_s=heard_s)
-        senders = [f"{name} published by: {await self._say_senders(name)}" for name in there]
+        senders = [say_senders(each, await fetch_publishers(connection, each)) for each in there]
         return cut("\n".join([f"listened for {duration_s:g} s", *senders, tree]))
-
-    async def _say_senders(self, topic: str) -> str:
-        publishers = await fetch_publishers(self._inquiry.connection, topic)
-        is_open = len(publishers.others) > 1
-        return f"{say_nodes(publishers)}{' (which of them sends which is not told)' * is_open}"

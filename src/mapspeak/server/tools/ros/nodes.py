@@ -12,19 +12,18 @@ from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import find_nearest
 from mapspeak.safety import SetParameter
 from mapspeak.server.text.ros.listening import (
-    MOST_NAMED,
     list_page,
-    mark_ours,
     match_names,
     page_of,
+    say_node,
 )
 from mapspeak.server.text.ros.refusals import (
     NO_PARAMETER,
     NO_PARAMETER_TO_DELETE,
     OTHER_KIND,
 )
-from mapspeak.server.text.ros.values import cut, say_descriptor, show_value
-from mapspeak.server.text.wording import list_some
+from mapspeak.server.text.ros.sent import READ_AT_START, say_deleted, say_new, say_set
+from mapspeak.server.text.ros.values import cut, say_descriptor, say_kind, show_value
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.topics import Filter, Page
@@ -32,8 +31,6 @@ from mapspeak.server.tools.toolset import ToolEffect, tool
 
 MOST_DESCRIBED = 5
 DESCRIBE = "rcl_interfaces/srv/DescribeParameters"
-READ_AT_START = "A node of ROS 1 that runs may notice only when it is started again."
-PLAIN = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
 
 Node = Annotated[str, Field(description="full name, such as /bt_navigator", max_length=200)]
 ParameterNode = Annotated[
@@ -68,18 +65,7 @@ class NodeTools:
         """
         name, connection = full_name(node), self._inquiry.connection
         await self._inquiry.check_node(name)
-        links, own = await connection.fetch_node(name), connection.own_ends
-        is_ours = bool(own.node) and name.endswith(f"/{own.node}")
-        told = {
-            "publishes": mark_ours(links.publishes, own.publishes if is_ours else ()),
-            "hears": mark_ours(links.subscribes, own.hears if is_ours else ()),
-            "serves": links.serves,
-        }
-        lines = [
-            f"{does}: {list_some(names, most=MOST_NAMED) or 'nothing'}"
-            for does, names in told.items()
-        ]
-        return cut("\n".join([name, *lines]))
+        return cut(say_node(name, await connection.fetch_node(name), connection.own_ends))
 
     @tool("ROS parameters", ToolEffect.READS)
     async def ros_parameters(
@@ -116,21 +102,19 @@ class NodeTools:
             if await connection.fetch_parameter(name, parameter) is None:
                 raise NO_PARAMETER_TO_DELETE.error(node=name, name=parameter[:80])
             await connection.set_parameter(name, parameter, None)
-            return f"{parameter} of {name} is deleted."
+            return say_deleted(name, parameter)
         is_ros1 = await self._inquiry.fetch_dialect() is Dialect.ROS1
         before = await connection.fetch_parameter(name, parameter)
-        notes: list[str] = []
+        notes = [READ_AT_START] if is_ros1 else []
         if before is None and name != "/":
-            notes = await self._say_missing(name, parameter, is_made=is_ros1)
+            notes.insert(0, await self._say_missing(name, parameter, is_made=is_ros1))
         if is_ros1:
             value = keep_kind(before, value, name=f"{parameter} of {name}")
-            notes.append(READ_AT_START)
         await connection.set_parameter(name, parameter, value)
         after = await connection.fetch_parameter(name, parameter)
-        said = f"{parameter} of {name} was {show_value(before)}, is {show_value(after)} now."
-        return " ".join([said, *notes])
+        return say_set(name, parameter, before, after, notes)
 
-    async def _say_missing(self, node: str, parameter: str, *, is_made: bool) -> list[str]:
+    async def _say_missing(self, node: str, parameter: str, *, is_made: bool) -> str:
         """Say of a parameter that is not set whether it is new, and which are like it.
 
         Raises:
@@ -139,13 +123,12 @@ class NodeTools:
         connection = self._inquiry.connection
         known = await connection.fetch_parameter_names(node)
         if parameter in known:
-            return []
+            return ""
         if not known:
             await self._inquiry.check_node(node)
         near = find_nearest(parameter, known)
         if is_made:
-            like = f": the nearest that it had is {near[0]}" if near else ""
-            return [f"It is new{like}."]
+            return say_new(near)
         shown = ", ".join(near or known[:5])
         has = f"It has {len(known)}, such as {shown}." if known else "It has none."
         raise NO_PARAMETER.error(node=node, name=parameter[:80], has=has)
@@ -183,7 +166,7 @@ def keep_kind(before: object, value: object, *, name: str) -> object:
     """
     if before is None:
         return value
-    old, new = (PLAIN.get(type(each), "a list or a table") for each in (before, value))
+    old, new = say_kind(before), say_kind(value)
     if old != new:
         raise OTHER_KIND.error(name=name, old=old, shown=show_value(before), new=new)
     return float(value) if type(before) is float and type(value) is int else value

@@ -7,14 +7,15 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.census import fetch_hearers, fetch_publishers, take_census
+from mapspeak.ros.census import Nodes, fetch_hearers, fetch_publishers, take_census
 from mapspeak.ros.hearing import Heard
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
 from mapspeak.safety import Publish
 from mapspeak.server.text.ros.listening import (
-    count_nodes,
+    count_ends,
     list_page,
     match_names,
+    say_ends,
     say_heard,
     say_loose_ends,
     say_loss,
@@ -30,6 +31,7 @@ from mapspeak.server.text.ros.refusals import (
     SILENT,
     UNPUBLISHED,
 )
+from mapspeak.server.text.ros.sent import say_hearers
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.ros.views import MOST_SUMMED, TOGETHER, MessageView, view_messages
 from mapspeak.server.tools.ros.goals import RosAccess
@@ -130,11 +132,7 @@ class TopicTools:
         connection = self._inquiry.connection
         census = await take_census(connection, await connection.fetch_nodes())
         chosen = match_names(lines, filter)
-        counted = {
-            name: f"{lines[name]} published by {count_nodes(census.publishers_of(name))}, "
-            f"heard by {count_nodes(census.hearers_of(name))}"
-            for name in chosen
-        }
+        counted = {name: f"{lines[name]} {count_ends(census, name)}" for name in chosen}
         text = list_page("topics", counted, None, page, len(lines))
         return cut("\n".join([text, *say_loose_ends(census, chosen)]))
 
@@ -154,14 +152,9 @@ class TopicTools:
             fields = (await self._inquiry.describe(type_name, kind="msg")).say()
         except LinkError as error:
             fields = str(error)
-        lines = [
-            f"{name} {await self._inquiry.say_type(type_name)}",
-            f"published by: {say_nodes(publishers)}",
-            f"heard by: {say_nodes(hearers)}",
-            *quality,
-            fields,
-        ]
-        return cut("\n".join(lines))
+        said = await self._inquiry.say_type(type_name)
+        ends = say_ends(publishers, hearers)
+        return cut("\n".join([f"{name} {said}", ends, *quality, fields]))
 
     @tool(
         "What a ROS type looks like",
@@ -238,10 +231,10 @@ class TopicTools:
         )
         said = await self._ros.publisher.publish(wanted)
         try:
-            hearers = await fetch_hearers(self._inquiry.connection, name)
+            hearers: Nodes | LinkError = await fetch_hearers(self._inquiry.connection, name)
         except LinkError as error:
-            return f"{said} Who heard it is not known: {error.message}"
-        return f"{said} Heard by: {say_nodes(hearers)}."
+            hearers = error
+        return f"{said} {say_hearers(hearers)}"
 
     async def _type_to_publish(self, topic: str, known: str | None, given: str | None) -> str:
         """Return the topic's own type; the one that was given only where there is no topic yet."""
