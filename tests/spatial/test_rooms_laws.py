@@ -98,6 +98,28 @@ def test_a_turned_map_has_the_turned_rooms(angle_deg: float) -> None:
     assert_same_regions(np.where(free, expected, 0), np.where(free, upright, 0))
 
 
+@pytest.mark.parametrize("angle_deg", [7.0, 20.0, 30.0])
+def test_areas_and_doors_of_a_turned_map_are_those_of_the_upright_one(angle_deg: float) -> None:
+    side = 780
+    fine = np.kron(building(), np.ones((2, 2), np.int8))
+    there = cv2.getRotationMatrix2D((N_COLS, N_ROWS), angle_deg, 1.0)
+    there[:, 2] += side / 2 - N_COLS, side / 2 - N_ROWS
+    picture = (fine + 1).astype(np.uint8)
+    turned = cv2.warpAffine(picture, there, (side, side), flags=cv2.INTER_NEAREST, borderValue=0)
+
+    found = divide(turned.astype(np.int8) - np.int8(1), resolution_m=RESOLUTION_M / 2)
+
+    upright = divide(building())
+    areas_m2, expected_m2 = (
+        [region.floor_area_m2 for region in rooms.regions] for rooms in (found, upright)
+    )
+    assert areas_m2 == pytest.approx(expected_m2, abs=0.25)
+    widths_m, expected_m = (
+        sorted(door.width_m for door in rooms.doors) for rooms in (found, upright)
+    )
+    assert widths_m == pytest.approx(expected_m, abs=0.06)
+
+
 def test_a_map_of_twice_the_resolution_has_the_same_rooms(labels: Labels) -> None:
     fine = np.kron(building(), np.ones((2, 2), np.int8))
 

@@ -15,32 +15,34 @@ _EDGE_BLUR_CELLS = 1.5
 _BELL_DEG = 2.0
 _APART_DEG = 6
 """Main directions differ by more than this."""
-_NEAR_DEG, _STEP_DEG = 4.0, 0.25
-_MOST_CELLS = 20_000
+_SEARCHES = ((45.0, 1.0, 5_000), (1.0, 0.25, 20_000))
+"""Reach and step in degrees, and how many cells to look at: coarse, then near the best."""
 
 
 def find_main_direction(occupied: NDArray[np.uint8]) -> float:
     """Return how far the strongest direction of walls is off the axes, from -45 to 45 degrees.
 
-    Of the angles near the peak of gradients, which steps in an oblique wall draw aside, the one
-    counts at which obstacles fall into the fewest rows and columns.
+    It is the angle at which the edges of obstacles fall into the fewest rows and columns.
+    Gradients would not do: the steps of an oblique wall draw them towards the axes.
     """
-    directions = find_wall_directions(occupied)
-    if not directions:
-        return 0.0
-    cells = np.flatnonzero(occupied)
-    rows, cols = np.divmod(cells[:: cells.size // _MOST_CELLS + 1], occupied.shape[1])
-    angles_deg = directions[0] + np.arange(-_NEAR_DEG, _NEAR_DEG, _STEP_DEG)
-    off_deg = (angles_deg + 45.0) % 90.0 - 45.0
-    # On small maps several are equally good: then the one nearest to the axes.
-    off_deg = off_deg[np.argsort(np.abs(off_deg), kind="stable")]
-    fullness = [_fullness(rows, cols, math.radians(angle_deg)) for angle_deg in off_deg]
-    return float(off_deg[int(np.argmax(fullness))])
+    inside = cv2.erode(occupied, np.ones((3, 3), np.uint8))
+    cells = np.flatnonzero(occupied > inside)
+    off_deg = 0.0
+    for reach_deg, step_deg, most_cells in _SEARCHES:
+        rows, cols = np.divmod(cells[:: cells.size // most_cells + 1], occupied.shape[1])
+        angles_deg = off_deg + np.arange(-reach_deg, reach_deg + step_deg / 2, step_deg)
+        # On small maps several are equally good: then the one nearest to the axes.
+        angles_deg = angles_deg[np.argsort(np.abs(angles_deg), kind="stable")]
+        fullness = [_fullness(rows, cols, math.radians(angle_deg)) for angle_deg in angles_deg]
+        off_deg = float(angles_deg[int(np.argmax(fullness))])
+    return (off_deg + 45.0) % 90.0 - 45.0
 
 
 def _fullness(rows: IntArray, cols: IntArray, angle_rad: float) -> float:
     """Return the sum of squares of how many cells fall into each row and each column."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
+    if not rows.size:
+        return 0.0
     sums = 0.0
     for places in (cosine * cols + sine * rows, cosine * rows - sine * cols):
         counts = np.bincount((places - places.min()).astype(np.intp)).astype(np.float64)

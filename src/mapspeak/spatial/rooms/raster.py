@@ -81,10 +81,7 @@ Affine = NDArray[np.float64]
 UPRIGHT_DEG = 0.6
 """Walls this near to the rows and columns of the map need no turn."""
 _LEAST_COVER, _HALF_COVER = 64, 128
-"""Least cover, of 255, by the map's cells for a turned cell to be occupied, or free.
-
-With more, an oblique wall one cell thick would break.
-"""
+"""Least cover, of 255, by the map's cells for a cell to be set: of what is thin, and else."""
 
 MAX_GRID_CELLS = 120_000_000
 MAX_RASTER_CELLS = 5_000_000
@@ -174,21 +171,22 @@ def build_raster(grid: OccupancyGrid) -> Raster:
     there = _shift(cols.start, rows.start)
     off_deg = find_main_direction(_resize(occupied, shrink=shrink, grow=grow, full=False))
     if abs(off_deg) > UPRIGHT_DEG:
-        # Turned at full resolution, so that walls one cell thick stay whole.
-        turn, size = _find_turn(known.shape, off_deg, grow)
-        free = _turn(free, turn, size, _HALF_COVER)
-        occupied = _turn(occupied, turn, size, _LEAST_COVER)
+        turn, size = _find_turn(known.shape, off_deg, grow / shrink)
+        free = (_turn(free, turn, size, shrink) >= _HALF_COVER).astype(np.uint8)
+        occupied = _settle(_turn(occupied, turn, size, shrink), _LEAST_COVER)
         used = (free | occupied) > 0
         rows, cols = _extent(np.any(used, axis=1)), _extent(np.any(used, axis=0))
         free, occupied = free[rows, cols], occupied[rows, cols]
-        there, grow = _shift(cols.start, rows.start) @ turn @ there, 1
-    free = _resize(free, shrink=shrink, grow=grow, full=True)
-    occupied = _resize(occupied, shrink=shrink, grow=grow, full=False)
+        there = _shift(cols.start, rows.start) @ turn @ there
+    else:
+        free = _resize(free, shrink=shrink, grow=grow, full=True)
+        occupied = _resize(occupied, shrink=shrink, grow=grow, full=False)
+        there = np.diag([grow / shrink, grow / shrink, 1.0]) @ there
     return Raster(
         free=free & (1 - occupied),
         occupied=occupied,
         cell_size_m=cell_size_m,
-        there=(np.diag([grow / shrink, grow / shrink, 1.0]) @ there)[:2],
+        there=there[:2],
         grid=grid,
     )
 
@@ -199,7 +197,7 @@ def _shift(col: int, row: int) -> Affine:
 
 
 def _find_turn(
-    shape: tuple[int, ...], angle_deg: float, scale: int
+    shape: tuple[int, ...], angle_deg: float, scale: float
 ) -> tuple[Affine, tuple[int, int]]:
     """Return the transform to a picture with walls of this direction upright, and its size."""
     high, wide = shape
@@ -211,11 +209,26 @@ def _find_turn(
     return turn, (across, along)
 
 
-def _turn(part: Picture, turn: Affine, size: tuple[int, int], least: int) -> Picture:
-    """Return a picture turned; a cell is set if covered by at least this much, of 255."""
-    there = _between_centres(turn)
-    cover = cv2.warpAffine(part * np.uint8(255), there, size, flags=cv2.INTER_LINEAR)
-    return (np.asarray(cover) >= least).astype(np.uint8)
+def _turn(part: Picture, turn: Affine, size: tuple[int, int], shrink: int) -> Picture:
+    """Return how far, of 255, each cell of a picture turned, and shrunk, is covered."""
+    cover: cv2.typing.MatLike = part * np.uint8(255)
+    if shrink > 1:
+        # About as wide as the new cells.
+        cover = cv2.GaussianBlur(cover, (0, 0), shrink / math.sqrt(12))
+    cover = cv2.warpAffine(cover, _between_centres(turn), size, flags=cv2.INTER_LINEAR)
+    return np.asarray(cover, np.uint8)
+
+
+def _settle(cover: Picture, least: int) -> Picture:
+    """Return the cells of obstacles as thick as they are, with what is thin left whole.
+
+    Cells covered by less than half are set where they join others, or where nothing else is.
+    """
+    square = np.ones((3, 3), np.uint8)
+    half = (cover >= _HALF_COVER).astype(np.uint8)
+    joins = np.asarray(cv2.morphologyEx(half, cv2.MORPH_CLOSE, square)) > 0
+    is_alone = np.asarray(cv2.dilate(half, square)) == 0
+    return half | ((cover >= least) & (joins | is_alone)).astype(np.uint8)
 
 
 def _between_centres(there: Affine) -> Affine:
@@ -242,7 +255,11 @@ def _factors(n_cells: int, resolution_m: float) -> tuple[int, int]:
 
 
 def _resize(picture: Picture, *, shrink: int, grow: int, full: bool) -> Picture:
-    """Resize a picture; a shrunk cell is set when any, or for `full` half, of its cells are."""
+    """Resize a picture; a shrunk cell is set when half of its cells are, and for what is thin any.
+
+    Args:
+        full: True to lose what is thin.
+    """
     if grow > 1:
         return np.repeat(np.repeat(picture, grow, axis=0), grow, axis=1)
     if shrink == 1:
@@ -251,7 +268,7 @@ def _resize(picture: Picture, *, shrink: int, grow: int, full: bool) -> Picture:
     padded = np.zeros((high * shrink, wide * shrink), np.uint8)
     padded[: picture.shape[0], : picture.shape[1]] = picture
     share = cv2.resize(padded * np.uint8(255), (wide, high), interpolation=cv2.INTER_AREA)
-    return (share >= (127 if full else 1)).astype(np.uint8)
+    return (share >= 127).astype(np.uint8) if full else _settle(np.asarray(share, np.uint8), 1)
 
 
 def open_box(picture: Picture, high: int, wide: int) -> Picture:
