@@ -103,7 +103,7 @@ def test_areas_and_doors_of_a_turned_map_are_those_of_the_upright_one(angle_deg:
     side = 780
     fine = np.kron(building(), np.ones((2, 2), np.int8))
     there = cv2.getRotationMatrix2D((N_COLS, N_ROWS), angle_deg, 1.0)
-    there[:, 2] += side / 2 - N_COLS, side / 2 - N_ROWS
+    there[:, 2] += np.array([side / 2 - N_COLS, side / 2 - N_ROWS])
     picture = (fine + 1).astype(np.uint8)
     turned = cv2.warpAffine(picture, there, (side, side), flags=cv2.INTER_NEAREST, borderValue=0)
 

@@ -228,7 +228,8 @@ def _settle(cover: Picture, least: int) -> Picture:
     half = (cover >= _HALF_COVER).astype(np.uint8)
     joins = np.asarray(cv2.morphologyEx(half, cv2.MORPH_CLOSE, square)) > 0
     is_alone = np.asarray(cv2.dilate(half, square)) == 0
-    return half | ((cover >= least) & (joins | is_alone)).astype(np.uint8)
+    is_thin = (cover >= least) & (joins | is_alone)
+    return np.asarray(half | is_thin, np.uint8)
 
 
 def _between_centres(there: Affine) -> Affine:
