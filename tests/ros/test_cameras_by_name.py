@@ -71,6 +71,23 @@ async def test_a_second_camera_is_looked_through_by_its_name(ros: int) -> None:
 
 
 @both
+async def test_a_picture_is_placed_where_the_robot_was_when_it_was_taken(ros: int) -> None:
+    scripted = with_cameras(ros)
+    turning = [
+        FrameTransform(
+            parent_from_child=Pose(1.0, at_s, at_s), parent="map", child="base_link", stamp_s=at_s
+        )
+        for at_s in (2.0, 2.9, 3.1, 100.0)
+    ]
+    scripted.latched["/tf"] = write_transforms(turning, dialect=scripted.dialect)
+    async with connect_scripted(scripted, patience=PATIENCE) as robot:
+        picture = await robot.fetch_picture()
+    assert picture.stamp_s == 3.0
+    assert picture.pose.y == pytest.approx(3.0)
+    assert picture.pose.yaw_rad == pytest.approx(3.0)
+
+
+@both
 async def test_a_camera_of_which_the_frames_do_not_tell_is_in_doubt_unless_it_is_the_main_one(
     ros: int,
 ) -> None:

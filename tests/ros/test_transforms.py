@@ -58,6 +58,39 @@ def test_a_clock_that_was_set_back_does_not_freeze_the_pose() -> None:
     assert grown.find(outer="map", inner="base_link").pose.x == 2.0
 
 
+def moving(*poses: tuple[float, Pose]) -> TransformTree:
+    return tree(*(transform("map", "base_link", pose, stamp_s=at_s) for at_s, pose in poses))
+
+
+def test_a_frame_that_moves_is_found_where_it_was() -> None:
+    grown = moving((1.0, Pose(0.0, 2.0, 3.0)), (2.0, Pose(1.0, 2.0, -3.0)), (3.0, Pose(5.0, 5.0)))
+    found = grown.find(outer="map", inner="base_link", at_s=1.5)
+    assert (found.pose.x, found.pose.y, found.stamp_s) == (0.5, 2.0, 1.5)
+    assert abs(found.pose.yaw_rad) == pytest.approx(math.pi)
+    assert grown.find(outer="map", inner="base_link", at_s=2.0).pose == Pose(1.0, 2.0, -3.0)
+
+
+def test_before_all_that_was_heard_and_after_it_a_frame_is_where_it_was_last() -> None:
+    grown = moving((1.0, Pose(0.0, 0.0)), (2.0, Pose(1.0, 0.0)))
+    for at_s in (0.5, 2.0, 2.5, 1e9, math.nan):
+        assert grown.find(outer="map", inner="base_link", at_s=at_s).pose == Pose(1.0, 0.0)
+
+
+def test_each_part_of_a_chain_is_taken_at_the_same_time() -> None:
+    grown = moving((1.0, Pose(0.0, 0.0, 0.0)), (2.0, Pose(0.0, 0.0, math.pi / 2)))
+    for at_s in (1.2, 1.6):
+        arm = transform("base_link", "arm", Pose(at_s, 0.0), stamp_s=at_s)
+        grown.take([arm], is_static=False)
+    found = grown.find(outer="map", inner="arm", at_s=1.5)
+    assert math.hypot(found.pose.x, found.pose.y) == pytest.approx(1.5)
+    assert found.pose.yaw_rad == pytest.approx(math.pi / 4)
+
+
+def test_a_clock_that_was_set_back_leaves_nothing_of_before() -> None:
+    grown = moving((5_000.0, Pose(1.0, 0.0)), (0.5, Pose(2.0, 0.0)), (1.5, Pose(3.0, 0.0)))
+    assert grown.find(outer="map", inner="base_link", at_s=1.0).pose.x == pytest.approx(2.5)
+
+
 def test_a_gap_names_both_of_its_edges() -> None:
     grown = tree(
         transform("odom", "base_link", Pose(0.0, 0.0)), transform("earth", "map", Pose(0.0, 0.0))

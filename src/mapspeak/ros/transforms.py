@@ -1,7 +1,9 @@
 """The tree of coordinate frames that ROS keeps in /tf and /tf_static, as far as it was heard."""
 
 import math
+from collections import deque
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 import anyio
@@ -9,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import StampedPose
 from mapspeak.ros.activity import News, Subscription
 from mapspeak.ros.messages.fields import Dialect, Message
@@ -19,6 +21,10 @@ from mapspeak.ros.port import RosConnection
 MAX_FRAMES = 10_000
 CLOCK_JUMP_S = 10.0
 """A transform this much older than the last one is not late: the robot's clock was set back."""
+PAST_STEP_S = 0.03
+"""Between two transforms of one frame that are kept; what moved meanwhile is interpolated."""
+N_PAST = 200
+"""Of each frame: what was measured six seconds ago can still be placed."""
 TF_HINT = (
     "Start SLAM or localisation (slam_toolbox, Cartographer, AMCL, gmapping) and the robot's "
     "drivers; `ros2 run tf2_tools view_frames` (ROS 1: `rosrun tf view_frames`) draws the tree."
@@ -26,10 +32,11 @@ TF_HINT = (
 
 
 class TransformTree:
-    """The newest transform of each frame to its parent."""
+    """The newest transform of each frame to its parent, and those of the last seconds."""
 
     def __init__(self) -> None:
         self._to_parent: dict[str, FrameTransform] = {}
+        self._past: dict[str, deque[FrameTransform]] = {}
         self._static: set[str] = set()
 
     @property
@@ -52,19 +59,25 @@ class TransformTree:
                 is_news = is_news or known != transform
                 self._to_parent[transform.child] = transform
                 (self._static.add if is_static else self._static.discard)(transform.child)
+                if not is_static:
+                    self._keep_past(transform)
         return is_news
 
-    def find(self, *, outer: str, inner: str) -> StampedPose:
+    def find(self, *, outer: str, inner: str, at_s: float = math.inf) -> StampedPose:
         """Return the pose of a frame in one that is above it in the tree.
 
         Its stamp is that of the oldest part that moves; 0 where nothing moves.
+
+        Args:
+            at_s: When, in robot time; what was heard last where nothing is known of then.
 
         Raises:
             LinkError: There is no such chain of frames, or it is a circle.
         """
         outer_from_inner = Pose(0.0, 0.0, 0.0)
         stamps: list[float] = []
-        for known in self._way_up(outer=outer, inner=inner):
+        for newest in self._way_up(outer=outer, inner=inner):
+            known = self._recall(newest, at_s)
             outer_from_inner = known.parent_from_child @ outer_from_inner
             if known.child not in self._static:
                 stamps.append(known.stamp_s)
@@ -91,6 +104,24 @@ class TransformTree:
         """
         from_outer, from_inner = self.find_ways(outer, inner)
         return np.linalg.inv(_chain(from_outer)) @ _chain(from_inner)
+
+    def _keep_past(self, transform: FrameTransform) -> None:
+        past = self._past.setdefault(transform.child, deque(maxlen=N_PAST))
+        if past and transform.stamp_s < past[-1].stamp_s:
+            past.clear()
+        if not past or transform.stamp_s >= past[-1].stamp_s + PAST_STEP_S:
+            past.append(transform)
+
+    def _recall(self, newest: FrameTransform, at_s: float) -> FrameTransform:
+        """Return how a frame lay at a time, between those that were heard before and after it."""
+        after = newest
+        for before in reversed(self._past.get(newest.child, ())):
+            if not at_s < newest.stamp_s or before.parent != newest.parent:
+                break
+            if before.stamp_s <= at_s:
+                return _interpolate(before, after, at_s)
+            after = before
+        return newest
 
     def _way_up(self, *, outer: str, inner: str) -> list[FrameTransform]:
         way: list[FrameTransform] = []
@@ -124,6 +155,18 @@ class TransformTree:
             f"{outer!r}.",
             hint=TF_HINT,
         )
+
+
+def _interpolate(before: FrameTransform, after: FrameTransform, at_s: float) -> FrameTransform:
+    """Return the transform between two, seen from above: straight and turning evenly."""
+    passed = (at_s - before.stamp_s) / (after.stamp_s - before.stamp_s)
+    one, other = before.parent_from_child, after.parent_from_child
+    pose = Pose(
+        one.x + passed * (other.x - one.x),
+        one.y + passed * (other.y - one.y),
+        wrap_angle(one.yaw_rad + passed * wrap_angle(other.yaw_rad - one.yaw_rad)),
+    )
+    return replace(before, parent_from_child=pose, stamp_s=at_s)
 
 
 def _chain(way_up: Iterable[FrameTransform]) -> NDArray[np.float64]:

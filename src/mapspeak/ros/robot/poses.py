@@ -1,10 +1,12 @@
 """The robot's pose estimate and its clock."""
 
+import math
 from dataclasses import replace
 
 import anyio
 
 from mapspeak.errors import LinkError
+from mapspeak.geometry import Pose
 from mapspeak.robot import StampedPose
 from mapspeak.ros.activity import News, Subscription
 from mapspeak.ros.discovery.profile import (
@@ -169,8 +171,21 @@ class PoseKeeper:
             )
         return self._from_topic(self._topic, self._topic.latest)
 
-    def _from_frames(self, frame: str) -> StampedPose:
-        found = self._frames.tree.find(outer=self._profile.map_frame, inner=frame)
+    def find_at(self, stamp_s: float) -> Pose:
+        """Return where the robot was when something was measured, as far as the frames tell.
+
+        Where a topic tells the pose on the map, it is the latest.
+
+        Raises:
+            LinkError: The robot has not said where it is.
+        """
+        if self._topic is not None:
+            return self.latest.pose
+        return self._from_frames(self._profile.base_frame, at_s=stamp_s).pose
+
+    def _from_frames(self, frame: str, *, at_s: float = math.inf) -> StampedPose:
+        tree = self._frames.tree
+        found = tree.find(outer=self._profile.map_frame, inner=frame, at_s=at_s)
         silent_s = self._measure_silence(self._frames.arrived_s, what="transform")
         return replace(found, silent_s=silent_s)
 

@@ -124,8 +124,8 @@ class RosRobot:
         await self.connection.wait_until_connected()
         eye = await self._find_camera(camera)
         picture = await eye.fetch()
-        here = await self._find_pose()
-        doubt = here.find_doubt(self.now_s)
+        doubt = (await self._find_pose()).find_doubt(self.now_s)
+        here = self._poses.find_at(picture.stamp_s)
         try:
             yaw_rad = find_camera_yaw_rad(
                 self._frames.tree, base=self.profile.base_frame, camera=picture.frame_id
@@ -141,7 +141,7 @@ class RosRobot:
             width_px=picture.width_px,
             height_px=picture.height_px,
             horizontal_fov_rad=await eye.fetch_fov_rad(),
-            pose=Pose(here.pose.x, here.pose.y, wrap_angle(here.pose.yaw_rad + yaw_rad)),
+            pose=Pose(here.x, here.y, wrap_angle(here.yaw_rad + yaw_rad)),
             stamp_s=picture.stamp_s,
             pose_doubt=doubt,
         )

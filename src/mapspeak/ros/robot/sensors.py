@@ -250,7 +250,7 @@ class Laser:
         return await scans.wait_for_more_than(scans.n_received, timeout_s=max(left_s, 0.0))
 
     def _read(self, message: Message, poses: PoseKeeper) -> RangeScan:
-        here, scan = poses.latest, read_scan(message)
+        scan = read_scan(message)
         if self._clock.is_set and abs(self._clock.now_s - scan.stamp_s) > STALE_S:
             raise LinkError("The scan is old.", hint="Compare the clocks of robot and laser.")
         mounting = find_mounting(
@@ -261,7 +261,7 @@ class Laser:
             angles_rad=angles_rad,
             ranges_m=ranges_m,
             reach_m=scan.largest_range_m,
-            pose=here.pose,
+            pose=poses.find_at(scan.stamp_s),
             stamp_s=scan.stamp_s,
         )
 
