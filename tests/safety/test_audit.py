@@ -100,3 +100,16 @@ def test_a_log_whose_folder_went_away_makes_it_again(tmp_path: Path) -> None:
     log = AuditLog(tmp_path / "deep" / "er" / "audit.jsonl", wall_clock=WallClock())
     log.write("stop", number=1, caller=NOBODY, robot_s=0.0)
     assert len(list(read_audit(log.path))) == 1
+
+
+def test_a_line_tells_the_kind_of_its_command_and_what_it_does(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path)
+    guard.clear(publish("on"), robot_s=1.23456)
+    guard.note_event("stop", "by the client", robot_s=float("nan"))
+    command, stop = audit_of(tmp_path)
+    assert (command.kind, command.what, command.robot_s) == (
+        "publish",
+        "publish std_msgs/msg/String on /lamp",
+        1.235,
+    )
+    assert (stop.kind, stop.what, stop.robot_s) == ("", "", None)

@@ -1,5 +1,6 @@
 import dataclasses
 import math
+from collections.abc import Callable
 from datetime import datetime, time, timedelta
 from typing import Any
 
@@ -393,3 +394,15 @@ def test_hours_say_when_they_end() -> None:
     over_night = Hours(begins=time(22), ends=time(6))
     late = MONDAY_NOON.replace(hour=23)
     assert over_night.end_of(late) == MONDAY_NOON.replace(hour=6) + timedelta(days=1)
+
+
+@pytest.mark.parametrize("wrap", [lambda inner: [inner], lambda inner: {"inner": inner}])
+@pytest.mark.parametrize(("depth", "is_read"), [(5, True), (50, False)])
+def test_a_slow_velocity_passes_where_it_is_not_nested_too_deep(
+    wrap: Callable[[object], object], depth: int, *, is_read: bool
+) -> None:
+    nested: object = twist(0.1)
+    for _ in range(depth):
+        nested = wrap(nested)
+    decision = decide(velocity({"deep": nested}), policy=Policy(), situation=NOW)
+    assert isinstance(decision, Allowed) == is_read

@@ -11,7 +11,7 @@ from mapspeak.safety.planning import STRAY_M, plan_legs
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import find_path
 from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea
-from mapspeak.worldmodel.revision import MapRevision
+from mapspeak.worldmodel.revision import Hindrance, MapRevision
 
 RADIUS_M = 0.3
 CELL_M = 0.05
@@ -67,3 +67,18 @@ def test_a_robot_that_keeps_off_the_wall_beside_an_area_gets_legs_that_it_goes_s
             own = find_path(narrow, *pair, radius_m=RADIUS_M)
             assert own is not None
             assert nearest_m(strip, list(own.points)) >= RADIUS_M + 0.05
+
+
+@pytest.mark.parametrize(("y", "n_legs"), [(1.0, 2), (4.5, 1)])
+def test_a_robot_is_led_round_a_hindrance_only_where_its_own_way_crosses_it(
+    y: float, n_legs: int
+) -> None:
+    area = ClosedArea(name="wet floor", outline=corners((3.0, 0.0), (4.5, 2.0)))
+    wet = Hindrance(area=area, extra_m=5.0, factor=3.0)
+    hindered = MapRevision(floor(), radius_m=RADIUS_M, hindrances=(wet,))
+    start, goal = Point(1.0, y), Pose(7.0, y)
+    legs = plan_legs(hindered, start, goal)
+    assert len(legs) >= n_legs
+    assert (len(legs) == 1) == (n_legs == 1)
+    assert legs[-1] == goal
+    assert nearest_m(area, [start, *(each.point for each in legs)]) > 0

@@ -2,13 +2,17 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fakes import FakeRobot, two_rooms
-from guarding import make_guard, rectangle
+from guarding import WallClock, make_guard, rectangle
 from mapspeak.memory import SemanticMapStore
-from mapspeak.safety import AreaRule, Policy
+from mapspeak.memory.events import Effect, Event
+from mapspeak.safety import AreaRule, CommandKind, Policy, Surveyor
+from mapspeak.safety.guard import RateLog
 from mapspeak.session import Session
+from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio
 
@@ -30,3 +34,40 @@ async def test_a_rule_that_closes_nothing_is_told_before_anybody_drives_or_looks
         "The policy closes R77 (the archive), which is not on this map.",
         "The policy's area 'quay' lies off this map: it closes nothing here.",
     ]
+
+
+async def test_a_map_is_surveyed_once_until_it_or_the_robots_width_changes() -> None:
+    surveyor = Surveyor((), wall_clock=WallClock())
+    first = await surveyor.survey(two_rooms(), radius_m=0.2)
+    grid = first.grid
+    assert await surveyor.survey(grid, radius_m=0.2) is first
+    assert surveyor.latest is first
+    wider = await surveyor.survey(grid, radius_m=0.3)
+    assert (wider is first, wider.radius_m) == (False, 0.3)
+    closed = OccupancyGrid(
+        cells=np.full_like(grid.cells, 100),
+        resolution_m=grid.resolution_m,
+        origin=grid.origin,
+    )
+    assert (await surveyor.survey(closed, radius_m=0.3)).grid is closed
+
+
+@pytest.mark.parametrize(("effect", "closes"), [(Effect.CLOSED, True), (Effect.SLOW, False)])
+def test_an_event_that_closes_a_place_is_as_good_as_a_rule(effect: Effect, *, closes: bool) -> None:
+    events = [Event(text="wet paint", place="corridor", effect=effect)]
+    surveyor = Surveyor((), wall_clock=WallClock(), read_events=lambda: events)
+    assert surveyor.has_rules == closes
+    assert not Surveyor((), wall_clock=WallClock()).has_rules
+
+
+@pytest.mark.parametrize(
+    ("now_s", "n_counted"), [(9.0, 2), (59.0, 2), (61.0, 1), (-30.0, 2), (-70.0, 0), (400.0, 0)]
+)
+def test_commands_of_the_last_minute_are_counted_though_the_clock_jumps(
+    now_s: float, n_counted: int
+) -> None:
+    rates = RateLog()
+    for noted_s in (0.0, 5.0):
+        rates.note(CommandKind.DRIVE, noted_s)
+    rates.note(CommandKind.CALL, 5.0)
+    assert rates.count(CommandKind.DRIVE, now_s) == n_counted

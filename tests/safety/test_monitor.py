@@ -1,13 +1,22 @@
+import itertools
 import math
 from collections.abc import Callable
 
 import pytest
 
 from drawing import grid_from_text
+from fakes import FakeRobot
 from guarding import corners
 from mapspeak.geometry import Point, Pose
-from mapspeak.robot import Cause, CauseCode
-from mapspeak.safety.monitor import AT_AREA, GoalMonitor, KeepOutMonitor, Mover
+from mapspeak.robot import Cause, CauseCode, StampedPose
+from mapspeak.safety.monitor import (
+    AT_AREA,
+    GoalMonitor,
+    KeepOutMonitor,
+    Mover,
+    StandingCheck,
+    follow_arc,
+)
 from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -160,3 +169,51 @@ def test_a_goal_that_closes_or_fills_up_is_no_goal_any_more() -> None:
     off = GoalMonitor(goal=Pose(-3.0, 1.0), radius_m=RADIUS_M)
     assert off.judge(FLOOR, now_s=0.0) is None
     assert off.judge(FLOOR, now_s=6.0) == Cause(code=CauseCode.GOAL_OFF_MAP)
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.0, math.pi, -2.0])
+async def test_a_robot_stands_whatever_its_heading_until_it_moves_or_turns(yaw_rad: float) -> None:
+    robot = FakeRobot(pose=Pose(1.0, 1.0, yaw_rad))
+    robot.set_clock(500.0)
+    check = StandingCheck(robot)
+    assert [await check.is_standing() for _ in range(3)] == [True] * 3
+    robot.pose = Pose(1.0, 1.0, yaw_rad + 0.1)
+    assert [await check.is_standing() for _ in range(2)] == [False, True]
+    robot.pose = Pose(1.05, 1.0, yaw_rad + 0.1)
+    assert not await check.is_standing()
+
+
+@pytest.mark.anyio
+async def test_a_robot_whose_pose_is_old_is_not_known_to_stand() -> None:
+    robot = FakeRobot(pose=Pose(1.0, 1.0))
+    check = StandingCheck(robot)
+    assert await check.is_standing()
+    stale = await robot.fetch_pose()
+    robot.set_clock(stale.stamp_s + 1.5)
+    robot.fetch_pose = lambda: at_once(stale)  # type: ignore[method-assign]
+    assert not await check.is_standing()
+
+
+async def at_once(stamped: StampedPose) -> StampedPose:
+    return stamped
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+@pytest.mark.parametrize("turn_radps", [-1.0, 0.0, 0.4])
+def test_an_arc_that_is_turned_leads_to_the_same_places_turned(
+    quarters: int, turn_radps: float
+) -> None:
+    turn = Pose(0.0, 0.0, quarters * math.pi / 2)
+    plain = follow_arc(Point(1.0, 2.0), 0.3, turn_radps, 2.0, n_steps=16)
+    turned = follow_arc(
+        turn.transform(Point(1.0, 2.0)), 0.3 + turn.yaw_rad, turn_radps, 2.0, n_steps=16
+    )
+    for here, there in zip(plain, turned, strict=True):
+        assert turn.transform(here).distance_to(there) < 1e-9
+    steps = [a.distance_to(b) for a, b in itertools.pairwise([Point(1.0, 2.0), *plain])]
+    assert steps == pytest.approx([2.0 / 16] * 16)
+    if turn_radps:
+        middle = Pose(1.0, 2.0, 0.3).transform(Point(0.0, 1 / turn_radps))
+        off_m = [each.distance_to(middle) - 1 / abs(turn_radps) for each in plain]
+        assert off_m == pytest.approx([0.0] * 16, abs=0.01)

@@ -16,6 +16,7 @@ from mapspeak.ros.port import RosConnection
 from mapspeak.safety import AreaRule, Policy
 from mapspeak.safety.planning import NO_FRAME, find_poses
 from mapspeak.session import Session
+from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio
 
@@ -175,3 +176,45 @@ async def test_a_drive_is_checked_on_the_map_that_was_surveyed_to_find_its_goal(
     await site.session.robot.send_goal(goal.pose)
 
     assert (await site.session.fetch_world_model()).map is surveyed
+
+
+@pytest.mark.parametrize(
+    ("turn", "yaw_rad"),
+    [
+        ({"z": math.sin(1.0), "w": math.cos(1.0)}, 2.0),
+        ({"x": math.sin(0.2), "w": math.cos(0.2)}, 0.0),
+        ({"y": math.sin(0.2), "w": math.cos(0.2)}, 0.0),
+        ({"x": 1.0, "w": 0.0}, 0.0),
+        ({"y": 1.0, "w": 0.0}, math.pi),
+    ],
+)
+def test_of_a_turn_in_space_the_heading_is_read(turn: dict[str, float], yaw_rad: float) -> None:
+    ((_, pose),) = find_poses({"position": {"x": 1.0}, "orientation": turn})
+    assert math.cos(pose.yaw_rad - yaw_rad) == pytest.approx(1.0)
+
+
+async def test_a_turn_where_the_robot_stands_is_allowed_though_the_map_shows_no_room(
+    tmp_path: Path,
+) -> None:
+    site = Site(tmp_path)
+    site.robot.grid = grid_from_text("###\n#.#\n###", resolution_m=0.3)
+    site.robot.pose = Pose(0.45, 0.45)
+    await site.send({"place": {"x": 0.47, "y": 0.45, "theta": 1.0}})
+    with pytest.raises(GoalError):
+        await site.send({"place": {"x": 0.75, "y": 0.45, "theta": 1.0}})
+    assert len(site.actions.goals) == 1
+
+
+@pytest.mark.parametrize(("clearance_m", "is_open"), [(0.0, True), (0.15, False)])
+async def test_a_goal_of_an_action_leaves_the_clearance_of_the_policy(
+    tmp_path: Path, clearance_m: float, *, is_open: bool
+) -> None:
+    site = Site(tmp_path, policy=Policy(clearance_m=clearance_m))
+    cells = HALL.cells.copy()
+    cells[:, 60], cells[38:43, 60] = 100, 0
+    site.robot.grid = OccupancyGrid(cells=cells, resolution_m=0.1, origin=HALL.origin)
+    if is_open:
+        await site.send({"pose": stamped(9.0, 4.0)})
+    else:
+        with pytest.raises(GoalError):
+            await site.send({"pose": stamped(9.0, 4.0)})

@@ -102,15 +102,12 @@ class Surveyor:
 
     def _survey(self, grid: OccupancyGrid, radius_m: float) -> MapRevision:
         before = self._latest
-        is_known = before is not None and before.radius_m == radius_m and before.is_of(grid)
-        revision = (
-            before
-            if before is not None and is_known
-            else MapRevision(
+        if before is not None and before.radius_m == radius_m and before.is_of(grid):
+            revision = before
+        else:
+            revision = MapRevision(
                 grid, radius_m=radius_m, previous=before, leaves_pockets=self._leaves_pockets
             )
-        )
-        if not is_known:
             self._warn(revision)
         events, now = self._read_events(), self._wall_clock()
         areas = (*self._find_closed(revision), *close_floor_of(events, revision, now))
