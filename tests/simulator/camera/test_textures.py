@@ -72,3 +72,20 @@ def test_a_far_surface_shows_the_mean_of_its_drawing() -> None:
     stripes = np.zeros((64, 64, 3), dtype=np.uint8)
     stripes[::2] = 200
     assert sample([stripes], 0, (0.3, 0.3), 0.01) == [100, 100, 100]
+
+
+@pytest.mark.parametrize(("surface", "most_levels"), [(Surface.WALL, 5.0), (Surface.WOOD, 40.0)])
+def test_plaster_is_even_and_wood_has_a_grain(surface: Surface, most_levels: float) -> None:
+    assert most_levels / 10 < draw(surface).astype(float).std(axis=(0, 1)).mean() < most_levels
+
+
+def test_a_ceiling_is_of_two_by_two_boards_with_joints_between_them() -> None:
+    ceiling = draw(Surface.CEILING).astype(float).mean(axis=2)
+    n = len(ceiling)
+    for lines in (ceiling.mean(axis=1), ceiling.mean(axis=0)):
+        is_joint = lines < lines.mean() - 5
+        assert np.flatnonzero(is_joint).tolist() == [
+            *(0, 1),
+            *range(n // 2 - 2, n // 2 + 2),
+            *(n - 2, n - 1),
+        ]

@@ -9,9 +9,9 @@ from mapspeak.simulator import LidarScan
 from mapspeak.simulator.robot.gridmap import LogOddsMap
 from mapspeak.simulator.robot.lidar import N_BEAMS, Lidar, measure_ranges
 from mapspeak.simulator.robot.scanmatch import SurfaceField, match_scan, place_points
-from mapspeak.simulator.robot.slam import Mapper
+from mapspeak.simulator.robot.slam import Localiser, Mapper
 from mapspeak.simulator.worlds.slices import Slice
-from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial import Cell, OccupancyGrid
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray[tuple[int, int]]:
@@ -198,3 +198,107 @@ def test_a_slow_robot_adds_a_scan_every_second() -> None:
     mapper = drive_through(ROOM, [Pose(0.004 * index, 0.0) for index in range(16)])
 
     assert mapper.n_updates == 1 + 3
+
+
+def test_a_map_published_after_each_scan_is_the_one_published_once() -> None:
+    hall = Slice((rectangle(-15.0, -12.0, 2.0, 1.0),))
+    often, once = LogOddsMap(), LogOddsMap()
+    for seed, (solids, pose) in enumerate(
+        [(ROOM, Pose(0.0, 0.0)), (hall, Pose(-2.0, -3.0, 1.0)), (hall, Pose(1.0, -2.0))]
+    ):
+        scan = scan_from(solids, pose, seed=seed)
+        for log_odds_map in (often, once):
+            log_odds_map.insert(place_points(pose, scan.ends_in_base), scan.is_return)
+        often.publish(stamp_s=0.0)
+
+    last, only = often.publish(stamp_s=1.0), once.publish(stamp_s=1.0)
+
+    assert only.origin == last.origin
+    assert np.array_equal(only.cells, last.cells)
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_a_scan_that_is_turned_makes_the_same_map_turned(quarters: int) -> None:
+    scan = LidarScan(measure_ranges(ROOM.edges, Pose(0.013, 0.021)), 0.0)
+    plain, turned = LogOddsMap(), LogOddsMap()
+    plain.insert(scan.ends_in_base, scan.is_return)
+    turn = Pose(0.0, 0.0, quarters * math.pi / 2)
+    turned.insert(place_points(turn, scan.ends_in_base), scan.is_return)
+
+    before, after = plain.publish(stamp_s=0.0), turned.publish(stamp_s=0.0)
+
+    expected = np.rot90(before.cells, -quarters)
+    assert after.cells.shape == expected.shape
+    assert np.count_nonzero(after.cells != expected) < 0.002 * expected.size
+
+
+@pytest.mark.parametrize("step", [Pose(0.16, 0.0), Pose(0.0, 0.0, 0.11)])
+def test_a_robot_that_drives_or_turns_fast_adds_each_scan(step: Pose) -> None:
+    poses = [Pose(-0.3, 0.0)]
+    for _ in range(4):
+        poses.append(poses[-1] @ step)
+
+    assert drive_through(ROOM, poses).n_updates == len(poses)
+
+
+def test_a_robot_that_turns_between_scans_keeps_its_heading() -> None:
+    turning = [Pose(0.0, 0.0, 0.25 * index) for index in range(9)]
+
+    mapper = drive_through(ROOM, turning, odometry_scale=0.9)
+
+    off = (turning[-1].inverse() @ mapper.map_from_base).yaw_rad
+    assert abs(off) < math.radians(0.5)
+
+
+FREE_ROOM = Slice((rectangle(-3.0, -2.0, 4.0, 3.0),))
+CRATE = rectangle(1.0, 0.5, 1.4, 0.9)
+FAR_WALL = Slice((rectangle(-3.0, -2.0, 12.0, 3.0),))
+
+
+def localise(known: Slice, seen: Slice, *, n_scans: int, pose: Pose) -> Localiser:
+    """Lets a robot that knows the map of one world stand in another one, shaking a little."""
+    grid = map_of(known, *[Pose(0.0, 0.0, 0.3 * turn) for turn in range(8)]).publish(stamp_s=7.0)
+    localiser = Localiser(grid, pose, random=np.random.default_rng(5))
+    for index in range(n_scans):
+        localiser.follow_odometry(Pose(0.0, 0.0, 0.02 * (index % 2)))
+        there = pose @ Pose(0.0, 0.0, 0.02 * (index % 2))
+        localiser.add_scan(scan_from(seen, there, seed=index, stamp_s=1.0 * index))
+    return localiser
+
+
+@pytest.mark.parametrize(("n_scans", "is_there"), [(2, False), (6, True)])
+def test_what_the_map_does_not_show_is_planned_around_once_it_was_seen_often(
+    n_scans: int, *, is_there: bool
+) -> None:
+    with_crate = Slice((*FREE_ROOM.outlines, CRATE))
+
+    localiser = localise(FREE_ROOM, with_crate, n_scans=n_scans, pose=Pose(-1.0, 0.0))
+
+    known, planned = localiser.publish(stamp_s=9.0), localiser.planning_map
+    added = planned.occupied & ~known.occupied
+    rows, cols = np.nonzero(added)
+    assert bool(len(rows)) is is_there
+    for row, col in zip(rows.tolist(), cols.tolist(), strict=True):
+        place = planned.point_at(Cell(row, col))
+        assert 0.9 <= place.x <= 1.5
+        assert 0.4 <= place.y <= 1.0
+    localiser.forget_obstacles()
+    assert localiser.planning_map is known
+
+
+def test_a_known_map_has_no_obstacles_of_its_own_nor_far_ones() -> None:
+    far_crate = rectangle(6.5, 0.3, 6.9, 0.7)
+    alone = localise(FAR_WALL, FAR_WALL, n_scans=6, pose=Pose(-1.0, 0.0))
+    far_off = localise(
+        FAR_WALL, Slice((*FAR_WALL.outlines, far_crate)), n_scans=6, pose=Pose(-1.0, 0.0)
+    )
+
+    assert alone.planning_map is alone.publish(stamp_s=0.0)
+    assert far_off.planning_map is far_off.publish(stamp_s=0.0)
+
+
+def test_localisation_mends_what_it_was_told_wrongly() -> None:
+    localiser = localise(ROOM, ROOM, n_scans=3, pose=Pose(0.4, -0.3, 0.5))
+
+    assert localiser.map_from_base.point.distance_to(Point(0.4, -0.3)) < 0.02
+    assert localiser.map_from_base.yaw_rad == pytest.approx(0.5, abs=math.radians(0.5))

@@ -111,3 +111,11 @@ def test_an_unknown_kind_is_refused_with_those_there_are() -> None:
     with pytest.raises(ConfigError, match="'unicorn'") as refused:
         footprint("unicorn", 0.0, 1.0)
     assert "forklift" in refused.value.hint
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_what_is_drawn_on_a_part_is_shown_once(kind: str) -> None:
+    for part in build_parts(kind):
+        assert np.linalg.norm(part.normals, axis=2) == pytest.approx(1.0)
+        if part.surface is not None:
+            assert (part.uv.min(), part.uv.max()) == pytest.approx((0.0, 1.0))
