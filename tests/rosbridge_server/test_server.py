@@ -15,7 +15,8 @@ from PIL import Image
 from bridging import SteppedRobot, bridge
 from fakes import two_rooms
 from mapspeak.errors import ConfigError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import NavigationLook, NavigationPart
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid
 from mapspeak.ros.messages.pictures import read_compressed_image
@@ -145,6 +146,33 @@ async def test_a_second_camera_has_topics_and_a_frame_of_its_own(dialect: Dialec
         fixed = read_transforms(await client.next_on("/tf_static"))
     (rear,) = (each for each in fixed if each.child == "rear_camera_link")
     assert abs(rear.parent_from_child.yaw_rad) == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(
+    ("dialect", "plan", "footprint"),
+    [
+        (Dialect.ROS1, "/move_base/NavfnROS/plan", "/move_base/local_costmap/footprint"),
+        (Dialect.ROS2, "/plan", "/local_costmap/published_footprint"),
+    ],
+)
+async def test_the_planned_path_and_the_footprint_are_published_while_somebody_listens(
+    dialect: Dialect, plan: str, footprint: str
+) -> None:
+    robot = SteppedRobot(two_rooms())
+    line = (Point(1.0, 1.0), Point(2.0, 1.0), Point(1.0, 1.0))
+    robot.navigation = tuple(
+        NavigationLook(part=part, age_s=0.0, lines=(line,))
+        for part in (NavigationPart.PLAN, NavigationPart.FOOTPRINT)
+    )
+    async with bridge(dialect, robot) as (robot, connect), connect() as client:
+        for topic in (plan, footprint):
+            await client.send(op="subscribe", topic=topic)
+        await client.all_before()
+        await robot.let_pass(0.6)
+        path = await client.next_on(plan)
+        ring = await client.next_on(footprint)
+    assert [each["pose"]["position"]["x"] for each in path["poses"]] == [1.0, 2.0, 1.0]
+    assert [each["x"] for each in ring["polygon"]["points"]] == [1.0, 2.0]
 
 
 async def test_a_robot_without_a_camera_or_map_publishes_neither() -> None:

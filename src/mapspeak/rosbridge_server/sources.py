@@ -1,16 +1,17 @@
 """The publications of the robot's nodes, taken from the port in time with its clock."""
 
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
-from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.robot import RangeScan, Robot, RobotDescription, StampedPose
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.robot import NavigationPart, RangeScan, Robot, RobotDescription, StampedPose
 from mapspeak.ros.messages.fields import Dialect, write_header, write_stamp
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import (
@@ -18,6 +19,7 @@ from mapspeak.ros.messages.poses import (
     FrameTransform,
     Twist,
     write_odometry,
+    write_pose,
     write_pose_with_covariance,
     write_transforms,
 )
@@ -37,6 +39,17 @@ SCAN_PERIOD_S = 0.1
 BATTERY_PERIOD_S = 1.0
 LASER_FRAME = "base_scan"
 SCAN_TOPIC = "/scan"
+NAVIGATION_PERIOD_S = 0.5
+NAVIGATION_TOPICS = {
+    Dialect.ROS1: {
+        NavigationPart.PLAN: "/move_base/NavfnROS/plan",
+        NavigationPart.FOOTPRINT: "/move_base/local_costmap/footprint",
+    },
+    Dialect.ROS2: {
+        NavigationPart.PLAN: "/plan",
+        NavigationPart.FOOTPRINT: "/local_costmap/published_footprint",
+    },
+}
 N_BEAMS = 720
 
 
@@ -108,6 +121,7 @@ class Sources:
             self._slow.append(Source(partial(self._publish_picture, camera), PICTURE_PERIOD_S))
         if robot.description.has_laser:
             self._slow.append(Source(self._publish_scan, SCAN_PERIOD_S))
+        self._slow.append(Source(self._publish_navigation, NAVIGATION_PERIOD_S))
         if skilled is not None:
             self._slow.append(Source(self._publish_battery, BATTERY_PERIOD_S))
 
@@ -202,6 +216,24 @@ class Sources:
         scan = await self._robot.fetch_scan()
         if scan is not None:
             self._hub.publish(SCAN_TOPIC, write_scan(_in_even_steps(scan), dialect=self._dialect))
+
+    async def _publish_navigation(self) -> None:
+        topics = NAVIGATION_TOPICS[self._dialect]
+        if not any(map(self._hub.is_wanted, topics.values())):
+            return
+        for look in await self._robot.fetch_navigation():
+            if look.part in topics and look.lines:
+                message = self._write_line(look.part, look.lines[0])
+                self._hub.publish(topics[look.part], message)
+
+    def _write_line(self, part: NavigationPart, line: Sequence[Point]) -> dict[str, Any]:
+        """Write nav_msgs/Path, or geometry_msgs/PolygonStamped of a ring, in the map."""
+        header = write_header("map", self._robot.now_s, dialect=self._dialect)
+        if part is NavigationPart.FOOTPRINT:
+            corners = [{"x": at.x, "y": at.y, "z": 0.0} for at in line[:-1]]
+            return {"header": header, "polygon": {"points": corners}}
+        poses = [{"header": header, "pose": write_pose(Pose(at.x, at.y))} for at in line]
+        return {"header": header, "poses": poses}
 
     async def _publish_pose(self) -> None:
         here = await self._robot.fetch_pose()

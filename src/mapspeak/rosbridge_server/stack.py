@@ -8,7 +8,7 @@ import anyio.lowlevel
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
-from mapspeak.robot import Robot, RobotDescription
+from mapspeak.robot import NavigationPart, Robot, RobotDescription
 from mapspeak.ros.discovery.watch import COSTMAPS
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
@@ -26,6 +26,7 @@ from mapspeak.rosbridge_server.skillservices import (
     types_of,
 )
 from mapspeak.rosbridge_server.sources import (
+    NAVIGATION_TOPICS,
     SCAN_TOPIC,
     TICK_S,
     Sources,
@@ -63,6 +64,13 @@ def topics_of(dialect: Dialect, offered: RobotDescription) -> list[Topic]:
         ]
     if offered.has_laser:
         topics.append(_published(SCAN_TOPIC, "sensor_msgs/LaserScan", LASER_NODE, depth=1))
+    shown = NAVIGATION_TOPICS[dialect]
+    topics += [
+        _published(shown[NavigationPart.PLAN], "nav_msgs/Path", navigator, depth=1),
+        _published(
+            shown[NavigationPart.FOOTPRINT], "geometry_msgs/PolygonStamped", navigator, depth=1
+        ),
+    ]
     if dialect is Dialect.ROS2:
         action = f"{ACTION}/_action"
         return [
