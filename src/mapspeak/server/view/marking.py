@@ -25,14 +25,15 @@ LINE_M, THICK_M, DOT_M, ARROW_M, TEXT_M = 0.05, 0.08, 0.08, 0.4, 0.25
 LEAST_DISC_M = 0.15
 LONGEST_LABEL = 80
 Colour = tuple[float, float, float, float]
+# Doors, frontiers, places and things have the colours of the page and of the picture.
 COLOURS: dict[str, Colour] = {
     "room": (0.1, 0.4, 0.9, 1.0),
     "corridor": (0.4, 0.4, 0.45, 1.0),
-    "doors": (0.6, 0.35, 0.1, 0.5),
-    "frontiers": (0.1, 0.65, 0.3, 1.0),
+    "doors": (0.9, 0.62, 0.0, 0.5),
+    "frontiers": (0.84, 0.37, 0.0, 1.0),
     "closed": (0.85, 0.1, 0.1, 1.0),
-    "places": (0.5, 0.2, 0.7, 1.0),
-    "things": (0.95, 0.55, 0.1, 0.5),
+    "places": (0.0, 0.45, 0.7, 1.0),
+    "things": (0.8, 0.47, 0.65, 0.5),
 }
 CYAN: Colour = (0.0, 0.7, 0.8, 1.0)
 """Of open spaces, and of the path."""
