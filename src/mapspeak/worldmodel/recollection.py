@@ -7,16 +7,19 @@ import logging
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from itertools import chain, repeat
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
-from mapspeak.memory.search.answer import Answer, Basis, Entry, EntryKind, list_entries
+from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
 from mapspeak.memory.things.finding import Things, find_things
@@ -33,13 +36,11 @@ KEPT_FROM = 1000
 THINGS_FILE = "things.cache"
 SAME_THING_M = 1.0
 """A thing of the same name within this distance of an earlier one is that one, seen better."""
-MOST_CALLED = 1000
-"""Largest number of things of one name that are told apart."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
 class RememberedPlace:
-    """A waypoint of the semantic map under its id, "W1" for the first in the file."""
+    """A waypoint under its id, "W1" for the first in the file; compared by identity."""
 
     id: str
     waypoint: Waypoint
@@ -65,13 +66,45 @@ class RememberedThing:
 Remembered = RememberedPlace | RememberedThing
 
 
+class Search:
+    """The index that answers questions, brought to what is asked for; safe between threads.
+
+    Args:
+        find_vectors: Find what compares meanings, or None.
+    """
+
+    def __init__(self, find_vectors: Callable[[], TextVectors | None]) -> None:
+        self._find_vectors = find_vectors
+        self._lock = threading.Lock()
+        self._index: EntryIndex | None = None
+        self._entries: WeakKeyDictionary[Remembered, Entry] = WeakKeyDictionary()
+
+    @contextmanager
+    def holding(self, entries: Sequence[Entry]) -> Iterator[EntryIndex]:
+        """Give the index with exactly these entries; another question waits meanwhile."""
+        with self._lock:
+            if self._index is None:
+                self._index = EntryIndex(vectors=self._find_vectors())
+            self._index.hold(entries)
+            yield self._index
+
+    def list_entries(self, recollection: "Recollection") -> tuple[Entry, ...]:
+        """Return what is said of places and things; what is known of the same ones stays."""
+        known = self._entries
+        return tuple(
+            known.get(each) or known.setdefault(each, recollection.describe(each))
+            for each in recollection.everything
+        )
+
+
 class Recollection:
     """All that is remembered, on one map; compared by identity.
 
     Args:
-        things: The same under their ids, in the order of these.
+        places: The records under their ids.
+        things: The things of these under their ids, in the order of these.
         n_named: How many ids were ever given.
-        find_vectors: Find what compares meanings, or None.
+        search: Answers questions.
     """
 
     def __init__(
@@ -79,18 +112,17 @@ class Recollection:
         memory: SemanticMap,
         found: Things,
         *,
+        places: Sequence[RememberedPlace],
         things: Sequence[RememberedThing],
         n_named: int,
-        find_vectors: Callable[[], TextVectors | None],
+        search: Search,
     ) -> None:
         self.memory = memory
         self.found = found
+        self.places = tuple(places)
         self.things = tuple(things)
         self.n_named = n_named
-        self.places = number_places(memory.waypoints)
-        self._find_vectors = find_vectors
-        self._lock = threading.Lock()
-        self._index: EntryIndex | None = None
+        self._search = search
 
     def is_of(self, memory: SemanticMap, grid: OccupancyGrid) -> bool:
         """Return True when it was made of these records and this very map."""
@@ -102,10 +134,9 @@ class Recollection:
         return (*self.places, *self.things)
 
     def prepare(self) -> None:
-        """Build the index that answers questions; a question asked meanwhile waits for it."""
-        with self._lock:
-            if self._index is None:
-                self._index = EntryIndex(self._entries, vectors=self._find_vectors())
+        """Bring the index that answers questions to this; a question meanwhile waits for it."""
+        with self._search.holding(self._entries):
+            pass
 
     def find(self, query: str, *, among: frozenset[str] | None = None, limit: int = 5) -> Answer:
         """Find places and things by name, meaning or words; the entries have their ids.
@@ -113,14 +144,13 @@ class Recollection:
         Args:
             among: The ids to choose from; all where None.
         """
-        self.prepare()
-        assert self._index is not None  # noqa: S101 - it was just prepared
-        return self._index.find(query, among=among, limit=limit)
+        with self._search.holding(self._entries) as index:
+            return index.find(query, among=among, limit=limit)
 
     def find_called(self, words: str) -> tuple[RememberedThing, ...]:
         """Find the things with that very name: case, plural and typing errors do not count."""
-        answer = self._names.find(words, limit=MOST_CALLED)
-        ids = {each.entry.id for each in answer.candidates if each.basis is Basis.NAME}
+        with self._search.holding(self._entries) as index:
+            ids = index.find_called(words)
         return tuple(each for each in self.things if each.id in ids)
 
     def find_thing(self, thing_id: str) -> RememberedThing | None:
@@ -136,23 +166,14 @@ class Recollection:
         return {place.waypoint.name: place for place in self.places}
 
     @cached_property
-    def _names(self) -> EntryIndex:
-        """The index of names alone, for which no meanings are compared."""
-        bare = (
-            Entry(
-                id=each.id,
-                kind=EntryKind.THING,
-                name=each.thing.label,
-                other_names=each.thing.other_labels,
-            )
-            for each in self.things
-        )
-        return EntryIndex(tuple(bare))
-
-    @cached_property
     def _entries(self) -> tuple[Entry, ...]:
-        places = (_place_entry(each) for each in self.places)
-        return (*places, *(_thing_entry(each, self._by_name) for each in self.things))
+        return self._search.list_entries(self)
+
+    def describe(self, each: Remembered) -> Entry:
+        """Return what is said of a place or a thing."""
+        if isinstance(each, RememberedPlace):
+            return _place_entry(each)
+        return _thing_entry(each, self._by_name)
 
 
 class Judge:
@@ -207,6 +228,7 @@ class Recollector:
         self._loading = threading.RLock()
         self._latest: Recollection | None = None
         self._n_joined = 0
+        self._search = Search(self._find_vectors)
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
         """Return what is remembered on a map; things keep their ids."""
@@ -279,23 +301,37 @@ class Recollector:
     ) -> Recollection:
         known = earlier.found if earlier else self._load_things(memory)
         found = find_things(memory, grid, earlier=known)
-        joined = found.pools.keys() - known.pools.keys() if known else found.pools.keys()
-        self._n_joined += sum(map(len, joined))
+        self._n_joined += found.n_joined
         things, n_named = number_things(
             found.things,
             () if earlier is None else earlier.things,
             n_named=0 if earlier is None else earlier.n_named,
         )
         return Recollection(
-            memory, found, things=things, n_named=n_named, find_vectors=self._find_vectors
+            memory,
+            found,
+            places=number_places(memory.waypoints, () if earlier is None else earlier.places),
+            things=things,
+            n_named=n_named,
+            search=self._search,
         )
 
 
-def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
-    """Return waypoints as remembered places with ids, in the order of the file."""
+def number_places(
+    waypoints: Sequence[Waypoint], earlier: Sequence[RememberedPlace] = ()
+) -> tuple[RememberedPlace, ...]:
+    """Return waypoints as remembered places with ids, in the order of the file.
+
+    Args:
+        earlier: Those of before, which are kept where they are the same.
+    """
     return tuple(
-        RememberedPlace(id=f"W{number}", waypoint=waypoint)
-        for number, waypoint in enumerate(waypoints, start=1)
+        before
+        if before is not None and before.waypoint is waypoint
+        else RememberedPlace(id=f"W{number}", waypoint=waypoint)
+        for number, (waypoint, before) in enumerate(
+            zip(waypoints, chain(earlier, repeat(None))), start=1
+        )
     )
 
 

@@ -434,6 +434,19 @@ def test_the_order_of_the_records_does_not_matter(
 
 
 @settings(max_examples=50)
+@given(st.lists(memories(), min_size=2, max_size=4), REQUESTS, MODELS)
+def test_after_any_changes_an_index_answers_as_one_made_from_nothing(
+    states: list[list[Entry]], query: str, embedder: ConceptEmbedder | None
+) -> None:
+    index = EntryIndex(vectors=vectors_of(embedder))
+    for entries in states:
+        index.hold(entries)
+        fresh = EntryIndex(entries, vectors=vectors_of(embedder))
+        assert index.find(query) == fresh.find(query)
+        assert index.find_called(query) == fresh.find_called(query)
+
+
+@settings(max_examples=50)
 @given(memories(), REQUESTS, MODELS)
 def test_the_same_request_has_the_same_answer_every_time(
     entries: list[Entry], query: str, embedder: ConceptEmbedder | None

@@ -57,6 +57,22 @@ LOW_TABLE = """
     #.......................#
     #########################
 """
+HALL = """
+    ################################################################################
+    #..............................................................................#
+    #............................................##................................#
+    #............................................##................................#
+    #............................................##................................#
+    #............................................##................................#
+    #..............................................................................#
+    #..............................................................................#
+    #..............................................................................#
+    #..............................................................................#
+    #..............................................................................#
+    #..............................................................................#
+    #..............................................................................#
+    ################################################################################
+"""
 CELL_M = 0.25
 ON_NORTH_WALL = Point(3.1, 2.6)
 
@@ -170,6 +186,16 @@ def test_two_equal_things_seen_from_one_place_stay_two() -> None:
     assert [thing.waypoints for thing in found] == [("a", "b"), ("a", "b")]
     assert off_m(found[0], left) < 0.4
     assert off_m(found[1], right) < 0.4
+
+
+def test_a_view_of_a_near_thing_is_not_joined_to_a_like_one_seventeen_metres_behind_it() -> None:
+    west, pillar = Point(0.25, 0.8), Point(11.75, 2.4)
+    found = things_of(
+        look("a", 1.6, 1.2, ("extinguisher", west)),
+        look("b", 17.0, 1.2, ("extinguisher", pillar)),
+        text=HALL,
+    )
+    assert sorted(thing.waypoints for thing in found) == [("a",), ("b",)]
 
 
 def test_told_ranges_weigh_more_than_lines_of_sight_that_happen_to_cross() -> None:
@@ -349,14 +375,62 @@ def test_a_turned_and_shifted_world_turns_and_shifts_the_places(
     assert off_m(there, moved_from_map.transform(here.position)) < 0.05
 
 
-def test_what_was_found_before_changes_no_answer() -> None:
-    grid = drawn(ROOM)
-    before = SemanticMap(waypoints=three_looks())
-    after = SemanticMap(
-        waypoints=(*three_looks(), look("d", 2.0, 1.4, ("printer", Point(0.2, 1.0))))
-    )
-    earlier = find_things(before, grid)
-    assert find_things(after, grid, earlier=earlier).things == find_things(after, grid).things
+EDITS = st.lists(
+    st.tuples(
+        st.sampled_from("abcdef"),
+        st.one_of(
+            st.none(),
+            st.lists(
+                st.tuples(
+                    st.sampled_from(["printer", "sink", "sink 2"]),
+                    st.one_of(st.none(), st.sampled_from([-1.2, -0.3, 0.0, 0.4, 1.5])),
+                    st.one_of(st.none(), st.just(0.9)),
+                ),
+                max_size=3,
+            ),
+        ),
+        st.sampled_from([(0.6, 0.8), (1.5, 1.4), (2.5, 0.6), (4.0, 1.2), (5.5, 2.0)]),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+@settings(max_examples=40)
+@given(EDITS)
+def test_after_any_writes_edits_and_forgets_the_things_are_those_of_a_joining_from_nothing(
+    edits: list[
+        tuple[str, list[tuple[str, float | None, float | None]] | None, tuple[float, float]]
+    ],
+) -> None:
+    grid = drawn(TWO_ROOMS)
+    known: dict[str, Waypoint] = {each.name: each for each in three_looks()}
+    found = find_things(SemanticMap(waypoints=tuple(known.values())), grid)
+    for name, told, (x, y) in edits:
+        known.pop(name, None)
+        if told is not None:
+            marks = tuple(
+                Landmark(label=label, bearing_rad=bearing, range_m=bearing and range_m)
+                for label, bearing, range_m in told
+            )
+            known[name] = Waypoint(name=name, pose=Pose(x, y, 1.0), functional_landmarks=marks)
+        memory = SemanticMap(waypoints=tuple(known.values()))
+        found = find_things(memory, grid, earlier=found)
+        assert found.things == find_things(memory, grid).things
+
+
+def test_a_write_joins_only_the_views_that_it_touches() -> None:
+    grid = drawn(TWO_ROOMS)
+    west = [look(each, 1.5, y, ("sink", Point(0.2, 1.2))) for each, y in (("a", 0.8), ("b", 1.6))]
+    east = look("c", 5.0, 0.8, ("sink", Point(6.1, 1.2)), has_range=True)
+    earlier = find_things(SemanticMap(waypoints=(*west, east)), grid)
+    more = look("d", 5.2, 1.6, ("sink", Point(6.1, 1.2)), has_range=True)
+
+    later = find_things(SemanticMap(waypoints=(*west, east, more)), grid, earlier=earlier)
+
+    assert later.n_joined == 2
+    known = {id(thing) for thing in earlier.things}
+    assert [thing.waypoints for thing in later.things if id(thing) in known] == [("a", "b")]
 
 
 def test_what_no_changed_waypoint_touches_is_not_worked_out_again() -> None:

@@ -9,9 +9,9 @@ remembered at all, are chances fitted to requests.
 import math
 import re
 from collections import defaultdict
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from itertools import chain, count
 
 import numpy as np
 
@@ -36,17 +36,14 @@ from mapspeak.memory.search.kinds import (
     find_kinds_called,
     without_opening,
 )
-from mapspeak.memory.search.meaningindex import Floats, MeaningIndex, TextVectors
+from mapspeak.memory.search.meaningindex import Floats, IntArray, MeaningIndex, TextVectors
 from mapspeak.memory.search.wordindex import (
     AskedWords,
     LookAlikes,
     WordIndex,
     content_stems,
     content_words,
-    stem,
 )
-
-_Key = TypeVar("_Key")
 
 WORDS_ONLY = "The search compares words only, no meanings."
 
@@ -89,38 +86,83 @@ class _Asked:
 
 
 class EntryIndex:
-    """Search index of the memory; rebuilt when anything changes.
+    """Search index of the memory.
 
     Args:
         entries: In any order, with unique ids.
-        vectors: Compares meanings; None without a model. When passed on to the next index, it
-            embeds only new texts.
+        vectors: Compares meanings; None without a model.
     """
 
-    def __init__(self, entries: Sequence[Entry], *, vectors: TextVectors | None = None) -> None:
-        self._entries = sorted(entries, key=lambda entry: entry.id)
+    def __init__(
+        self, entries: Sequence[Entry] = (), *, vectors: TextVectors | None = None
+    ) -> None:
+        self._entries: dict[int, Entry] = {}
+        self._number_of: dict[str, int] = {}
+        self._held: Sequence[Entry] | None = None
         self._vectors = vectors
-        said = [entry.texts for entry in self._entries]
-        self._kinds = KindIndex(self._entries, said, vectors)
-        common = [self._kinds.say_of(entry) for entry in self._entries]
-        self._words = WordIndex(said)
+        self._kinds = KindIndex(vectors)
+        self._words = WordIndex()
         # With a model, general knowledge is compared by meaning and needs no words.
-        self._common_words = WordIndex(common if vectors is None else ())
-        self._meanings = (
-            None if vectors is None else MeaningIndex(self._entries, said, common, vectors)
-        )
+        self._common_words = WordIndex()
+        self._meanings = None if vectors is None else MeaningIndex(vectors)
         self._thresholds = WORD_THRESHOLDS if vectors is None else vectors.embedder.thresholds
-        names = [entry.names for entry in self._entries]
-        words_of = {name: _words_of(name) for each in names for name in each}
-        keys = {name: name_key(name) for name in words_of}
-        letters = {name: "".join(map(stem, words)) for name, words in words_of.items()}
-        self._of_key = _numbers_by({keys[name] for name in each} for each in names)
-        self._of_letters = _numbers_by({letters[name] for name in each} for each in names)
-        self._of_other = _numbers_by(
-            {_letters_of(text) for field, text in own if field is MatchField.OTHER_NAME}
-            for own in common
-        )
-        self._look_alikes = LookAlikes({" ".join(words) for words in words_of.values()} - {""})
+        self._of_key, self._of_letters, self._of_other = (_Numbers() for _ in range(3))
+        self._look_alikes: LookAlikes | None = None
+        self.hold(entries)
+
+    def hold(self, entries: Sequence[Entry]) -> None:
+        """Hold exactly these entries; those that it has cost next to nothing."""
+        if entries is self._held:
+            return
+        wanted = {entry.id: entry for entry in entries}
+        gone = [
+            number
+            for id_, number in self._number_of.items()
+            if (entry := wanted.get(id_)) is not self._entries[number]
+            and entry != self._entries[number]
+        ]
+        for number in gone:
+            self._remove(number)
+        self._add([entry for id_, entry in wanted.items() if id_ not in self._number_of])
+        self._held = entries
+
+    def _add(self, entries: Sequence[Entry]) -> None:
+        self._kinds.add(entries)
+        free = (number for number in count() if number not in self._entries)
+        added = []
+        for entry in entries:
+            number = next(free)
+            self._entries[number], self._number_of[entry.id] = entry, number
+            said, common = entry.texts, self._kinds.say_of(entry)
+            self._words.add(number, said)
+            if self._meanings is None:
+                self._common_words.add(number, common)
+            added.append((number, entry, said, common))
+            for numbers, keys in self._keys_of(entry):
+                numbers.add(number, keys)
+        if self._meanings is not None:
+            self._meanings.add(added)
+        self._look_alikes = None
+
+    def _remove(self, number: int) -> None:
+        entry = self._entries.pop(number)
+        del self._number_of[entry.id]
+        self._words.remove(number)
+        if self._meanings is None:
+            self._common_words.remove(number)
+        else:
+            self._meanings.remove(number)
+        for numbers, keys in self._keys_of(entry):
+            numbers.remove(number, keys)
+        self._kinds.remove(entry)
+        self._look_alikes = None
+
+    def _keys_of(self, entry: Entry) -> Iterator[tuple["_Numbers", set[str]]]:
+        """Return what an entry is called, in the forms that requests are compared with."""
+        yield self._of_key, {name_key(name) for name in entry.names}
+        yield self._of_letters, {"".join(content_stems(name)) for name in entry.names}
+        others = (t for field, t in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME)
+        yield self._of_other, {_letters_of(text) for text in others}
 
     def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
         """Find what a request may mean.
@@ -131,11 +173,12 @@ class EntryIndex:
         words = self._words.ask(query)
         understood = self._understand(query, words)
         asked = self._compare(query, understood, words)
-        order = self._order(asked.ratios, among)
-        n_meant = self._count_meant(asked, order)
+        likely = self._find_likely(asked.ratios, among)
+        order = self._order(asked.ratios, likely, limit)
+        n_meant = self._count_meant(asked, order, likely)
         verdict, is_sure = self._judge(asked, order, n_meant)
         is_missing = asked.missing is not None and _missing_ratio(asked, order) > 0
-        said = self._words.score_ratios(words, WHOLE_WORD_WEIGHTS)
+        said = self._words.score_ratios(words, WHOLE_WORD_WEIGHTS, size=len(asked.ratios))
         return Answer(
             query=query,
             understood=understood,
@@ -147,6 +190,16 @@ class EntryIndex:
             limits=WORDS_ONLY if self._meanings is None else None,
         )
 
+    def find_called(self, query: str) -> set[str]:
+        """Return the ids of entries with that very name, whatever its case, number or spelling."""
+        understood = self._understand(query, self._words.ask(query))
+        numbers = chain(
+            self._of_key.find(name_key(query)),
+            self._of_letters.find(_letters_of(query)),
+            self._of_letters.find(_letters_of(understood)),
+        )
+        return {self._entries[number].id for number in numbers}
+
     def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
         """Return the request with its spelling corrected, or the name that it resembles."""
         put_right = _put_right(query, words)
@@ -154,6 +207,9 @@ class EntryIndex:
         is_known = letters in self._of_letters or letters in self._of_other
         if is_known or find_kinds_called(put_right) or not any(each.is_doubtful for each in words):
             return put_right
+        if self._look_alikes is None:
+            names = (" ".join(_words_of(n)) for each in self._entries.values() for n in each.names)
+            self._look_alikes = LookAlikes(filter(None, names))
         likest = self._look_alikes.find(
             " ".join(_words_of(query)), least_ratio=_LEAST_NAME_LIKENESS, limit=1
         )
@@ -161,40 +217,47 @@ class EntryIndex:
 
     def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
         common: tuple[AskedWords, ...] = ()
+        size = max(self._entries, default=-1) + 1
         part_ratios, missing = None, None
         # An English model cannot compare other scripts.
         is_latin = any(word.isascii() for _, word in content_words(understood))
         if self._vectors is None or self._meanings is None or not is_latin:
-            ratios = self._words.score_ratios(words)
+            ratios = self._words.score_ratios(words, size=size)
             if self._vectors is None:
                 common = self._common_words.ask(understood)
                 ratios = np.maximum(
-                    ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS)
+                    ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS, size=size)
                 )
                 missing = self._kinds.find_missing_called(understood)
         else:
             vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
             part_ratios, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
-            ratios = self._meanings.ratios(part_ratios)
+            ratios = self._meanings.ratios(part_ratios, size)
         ratios = np.clip(ratios, 0.0, _MOST_WITHOUT_NAME)
-        ratios[self._of_other.get(_letters_of(understood), [])] = _SAME_KIND
-        ratios[self._of_letters.get(_letters_of(understood), [])] = _SAME_WORDS_MISSPELT
-        ratios[self._of_letters.get(_letters_of(query), [])] = _SAME_WORDS
-        ratios[self._of_key.get(name_key(query), [])] = _SAME_NAME
+        ratios[self._of_other.find(_letters_of(understood))] = _SAME_KIND
+        ratios[self._of_letters.find(_letters_of(understood))] = _SAME_WORDS_MISSPELT
+        ratios[self._of_letters.find(_letters_of(query))] = _SAME_WORDS
+        ratios[self._of_key.find(name_key(query))] = _SAME_NAME
         return _Asked(understood, words, common, ratios, part_ratios, missing)
 
-    def _order(self, ratios: Floats, among: Container[str] | None) -> list[int]:
+    def _find_likely(self, ratios: Floats, among: Container[str] | None) -> IntArray:
         likely = np.flatnonzero(ratios > 0)
         if among is not None:
-            likely = likely[[self._entries[number].id in among for number in likely]]
-        order: list[int] = likely[np.argsort(-ratios[likely], kind="stable")].tolist()
-        return order
+            likely = likely[[self._entries[number].id in among for number in likely.tolist()]]
+        return likely
 
-    def _count_meant(self, asked: _Asked, order: list[int]) -> int:
+    def _order(self, ratios: Floats, likely: IntArray, limit: int) -> list[int]:
+        """Return the likeliest; of equally likely ones those with the first ids."""
+        if len(likely) > limit > 0:
+            least = np.partition(ratios[likely], -limit)[-limit]
+            likely = likely[ratios[likely] >= least]
+        return sorted(likely.tolist(), key=lambda n: (-ratios[n], self._entries[n].id))
+
+    def _count_meant(self, asked: _Asked, order: list[int], likely: IntArray) -> int:
         if not order:
             return 0
         margin = 0.0 if asked.basis(order[0]) is Basis.NAME else self._thresholds.same_ratio
-        return int(np.count_nonzero(asked.ratios[order] >= asked.ratios[order[0]] - margin))
+        return int(np.count_nonzero(asked.ratios[likely] >= asked.ratios[order[0]] - margin))
 
     def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> tuple[Verdict, bool]:
         """Return the trust in the likeliest entry, and whether its kind is surely the one meant."""
@@ -230,8 +293,9 @@ class EntryIndex:
         a toilet in this one likelier to be meant.
         """
         name = name_key(self._entries[first].name)
-        is_other = np.ones(len(ratios), dtype=bool)
-        is_other[self._of_key[name]] = False
+        is_other = np.zeros(len(ratios), dtype=bool)
+        is_other[list(self._entries)] = True
+        is_other[self._of_key.find(name)] = False
         return float(ratios[first] - ratios[is_other].max()) if is_other.any() else 0.0
 
     def _candidate(self, number: int, asked: _Asked, said: Floats) -> EntryCandidate:
@@ -267,12 +331,27 @@ def _missing_ratio(asked: _Asked, order: list[int]) -> float:
     return asked.missing[1] - float(asked.ratios[order[0]])
 
 
-def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:
-    numbers: dict[_Key, list[int]] = defaultdict(list)
-    for number, each in enumerate(keys):
-        for key in each:
-            numbers[key].append(number)
-    return numbers
+class _Numbers:
+    """The numbers of entries, by what they are called."""
+
+    def __init__(self) -> None:
+        self._numbers: defaultdict[str, set[int]] = defaultdict(set)
+
+    def add(self, number: int, keys: Iterable[str]) -> None:
+        for key in keys:
+            self._numbers[key].add(number)
+
+    def remove(self, number: int, keys: Iterable[str]) -> None:
+        for key in keys:
+            self._numbers[key].remove(number)
+            if not self._numbers[key]:
+                del self._numbers[key]
+
+    def find(self, key: str) -> list[int]:
+        return list(self._numbers.get(key, ()))
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._numbers
 
 
 def _put_right(query: str, words: Iterable[AskedWords]) -> str:

@@ -1,9 +1,9 @@
 """Kinds of things from general knowledge, and the kinds that a request names."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from types import MappingProxyType
 
@@ -14,7 +14,7 @@ from mapspeak.memory.policy import find_head, words_of
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import Entry, EntryKind, MatchField
 from mapspeak.memory.search.meaningindex import LESS_FOR_COMMON, TextVectors
-from mapspeak.memory.search.wordindex import Texts, content_stems, split_words
+from mapspeak.memory.search.wordindex import MOST_KEPT, Texts, content_stems, split_words
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +95,7 @@ def ends_with(stems: tuple[str, ...], ending: tuple[str, ...]) -> bool:
     return stems[len(stems) - len(ending) :] == ending if len(ending) <= len(stems) else False
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def find_named_kinds(text: str) -> frozenset[ThingKind]:
     """Find the kinds that a text names anywhere."""
     stems = content_stems(text)
@@ -157,25 +158,44 @@ Floats = NDArray[np.float64]
 class KindIndex:
     """The kinds of some entries, and the names of all other kinds."""
 
-    def __init__(
-        self, entries: Sequence[Entry], said: Sequence[Texts], vectors: TextVectors | None
-    ) -> None:
+    def __init__(self, vectors: TextVectors | None) -> None:
         names = [(name, kind) for kind in read_kinds() for name in kind.names]
         uses = [(use, kind) for kind in read_kinds() for use in kind.uses]
         self._kinds = [kind for _, kind in (*names, *uses)]
         self._n_names = len(names)
         texts = [text for text, _ in (*names, *uses)]
+        self._embedded = vectors
         self._vectors = None if vectors is None else vectors.find(texts).astype(np.float64)
-        labels = {name for entry in entries for name in entry.names}
-        self._kinds_of = {label: find_kinds(label) for label in labels}
-        if vectors is not None and self._vectors is not None:
-            self._find_by_meaning(vectors, self._vectors[: self._n_names])
-        known = {kind for kinds in self._kinds_of.values() for kind in kinds}
-        # Things mentioned in a description are remembered, too.
-        described = {text for own in said for field, text in own if field in _NAMING}
-        known.update(kind for text in described for kind in find_named_kinds(text))
-        self._absent = np.array([kind not in known for kind in self._kinds], dtype=bool)
+        self._kinds_of: dict[str, tuple[ThingKind, ...]] = {}
+        self._n_known: Counter[ThingKind] = Counter()
+        self._absent: NDArray[np.bool_] | None = None
         self._said_of: dict[tuple[str, ...], Texts] = {}
+
+    def add(self, entries: Sequence[Entry]) -> None:
+        """Count the kinds of entries as remembered."""
+        new = {name for entry in entries for name in entry.names} - self._kinds_of.keys()
+        self._kinds_of |= {label: find_kinds(label) for label in new}
+        if self._embedded is not None and self._vectors is not None:
+            self._find_by_meaning(new, self._embedded, self._vectors[: self._n_names])
+        for entry in entries:
+            self._n_known.update(self._kinds_told(entry))
+        self._absent = None
+
+    def remove(self, entry: Entry) -> None:
+        """Count the kinds of an entry no more."""
+        self._n_known.subtract(self._kinds_told(entry))
+        self._absent = None
+
+    def _kinds_told(self, entry: Entry) -> set[ThingKind]:
+        told = {kind for name in entry.names for kind in self._kinds_of[name]}
+        # Things mentioned in a description are remembered, too.
+        described = (find_named_kinds(text) for field, text in entry.texts if field in _NAMING)
+        return told.union(*described)
+
+    def _find_absent(self) -> NDArray[np.bool_]:
+        if self._absent is None:
+            self._absent = np.array([not self._n_known[kind] for kind in self._kinds], dtype=bool)
+        return self._absent
 
     def say_of(self, entry: Entry) -> Texts:
         """Return general knowledge of a thing: its other names, then its uses."""
@@ -204,27 +224,30 @@ class KindIndex:
         Returns:
             Its first name, and the similarity.
         """
-        if self._vectors is None or not self._absent.any():
+        absent = self._find_absent()
+        if self._vectors is None or not absent.any():
             return None
         ratios = np.round(self._vectors @ vector, 6)
         ratios[self._n_names :] -= LESS_FOR_COMMON
-        number = int(np.where(self._absent, ratios, -1.0).argmax())
+        number = int(np.where(absent, ratios, -1.0).argmax())
         return self._kinds[number].names[0], float(ratios[number])
 
     def find_missing_called(self, request: str) -> tuple[str, float] | None:
         """Find the kind that a request names and nothing else, if it is not remembered."""
         stems = content_stems(request)
-        is_absent = dict(zip(self._kinds, self._absent.tolist(), strict=True))
+        is_absent = dict(zip(self._kinds, self._find_absent().tolist(), strict=True))
         called = (kind for kind in find_kinds_called(request) if is_absent[kind])
         names = (name for kind in called for name in kind.names if content_stems(name) == stems)
         return next(((name, 1.0) for name in names), None)
 
-    def _find_by_meaning(self, vectors: TextVectors, of_names: Floats) -> None:
+    def _find_by_meaning(
+        self, labels: Iterable[str], vectors: TextVectors, of_names: Floats
+    ) -> None:
         """Assign to labels that name no kind the kind with the most similar name."""
         unknown = sorted(
             label
-            for label, kinds in self._kinds_of.items()
-            if not (kinds or is_carrier(label) or is_gone(label))
+            for label in labels
+            if not (self._kinds_of[label] or is_carrier(label) or is_gone(label))
         )
         if not unknown:
             return

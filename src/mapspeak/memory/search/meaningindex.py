@@ -5,8 +5,9 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 from zipfile import BadZipFile
 
 import numpy as np
@@ -125,6 +126,7 @@ _AT_ONCE = 4096
 _LEAST_LENGTH = 1e-3
 
 Floats = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 
 class _Part(NamedTuple):
@@ -143,62 +145,106 @@ class MeaningIndex:
     however many things are called a ladder or stand in one place.
     """
 
-    def __init__(
-        self,
-        entries: Sequence[Entry],
-        said: Sequence[Texts],
-        common: Sequence[Texts],
-        vectors: TextVectors,
-    ) -> None:
-        number_of: dict[_Part, int] = {}
-        numbers = [
-            [number_of.setdefault(part, len(number_of)) for part in _all_parts(*each)]
-            for each in zip(entries, said, common, strict=True)
-        ]
-        self._parts = list(number_of)
-        self._numbers = np.array([number for own in numbers for number in own], dtype=np.int64)
-        self._starts = np.cumsum([0, *map(len, numbers)])[:-1]
-        texts = sorted({text for part in self._parts for text in (part.name, part.text)})
-        row_of = {text: row for row, text in enumerate(texts)}
-        self._texts = vectors.find(texts).astype(np.float64)
-        self._names = np.array([row_of[part.name] for part in self._parts], dtype=int)
-        self._contexts = np.array([row_of[part.text] for part in self._parts], dtype=int)
-        self._is_common = np.array([part.field in _COMMON for part in self._parts], dtype=bool)
-        # Never 0: halves may be unknown words, or opposites.
-        self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
+    def __init__(self, vectors: TextVectors) -> None:
+        self._vectors = vectors
+        self._number_of: dict[_Part, int] = {}
+        self._parts: list[_Part] = []
+        self._own: dict[int, list[int]] = {}
+        self._rows: dict[str, int] = {}
+        n_wide = vectors.find([]).shape[1]
+        self._texts = _Column(np.empty((0, n_wide)))
+        self._names, self._contexts = (_Column(np.empty(0, dtype=np.intp)) for _ in range(2))
+        self._is_common = _Column(np.empty(0, dtype=bool))
+        self._lengths = _Column(np.empty(0))
+        self._starts: tuple[IntArray, IntArray, IntArray] | None = None
+
+    def add(self, texts: Iterable[tuple[int, Entry, Texts, Texts]]) -> None:
+        """Add entries under numbers that none has, each with its texts and what is known of such.
+
+        Parts of an entry that is removed stay, for they may come again.
+        """
+        begin = len(self._parts)
+        for number, entry, said, common in texts:
+            parts = list(_all_parts(entry, said, common))
+            for part in parts:
+                if part not in self._number_of:
+                    self._number_of[part] = len(self._parts)
+                    self._parts.append(part)
+            self._own[number] = [self._number_of[part] for part in parts]
+        self._starts = None
+        self._embed(self._parts[begin:])
+
+    def remove(self, number: int) -> None:
+        """Remove the entry of a number."""
+        del self._own[number]
+        self._starts = None
+
+    def _embed(self, parts: Sequence[_Part]) -> None:
+        texts = {text for part in parts for text in (part.name, part.text)}
+        new = sorted(texts - self._rows.keys())
+        self._rows |= {text: len(self._rows) + i for i, text in enumerate(new)}
+        self._texts.extend(self._vectors.find(new).astype(np.float64))
+        names = np.array([self._rows[part.name] for part in parts], dtype=np.intp)
+        contexts = np.array([self._rows[part.text] for part in parts], dtype=np.intp)
+        self._names.extend(names)
+        self._contexts.extend(contexts)
+        self._is_common.extend(np.array([part.field in _COMMON for part in parts], dtype=bool))
+        for start in range(0, len(parts), _AT_ONCE):
+            rows = slice(start, start + _AT_ONCE)
+            sums = self._texts.now[names[rows]] + self._texts.now[contexts[rows]]
+            # Never 0: halves may be unknown words, or opposites.
+            self._lengths.extend(np.maximum(np.linalg.norm(sums, axis=1), _LEAST_LENGTH))
 
     def compare(self, vector: Floats) -> Floats:
         """Return the similarity of each part to the phrase of a vector, from -1 to 1.
 
         General knowledge of a thing counts a little less than its own texts.
         """
-        likeness = self._texts @ vector
-        ratios = likeness[self._names] + likeness[self._contexts]
+        likeness = self._texts.now @ vector
+        ratios = likeness[self._names.now] + likeness[self._contexts.now]
         # Rounded, since the order of the rows may change the last digit of a product.
-        ratios = np.round(ratios / self._lengths, 6)
-        return np.asarray(np.where(self._is_common, ratios - LESS_FOR_COMMON, ratios))
+        ratios = np.round(ratios / self._lengths.now, 6)
+        return np.asarray(np.where(self._is_common.now, ratios - LESS_FOR_COMMON, ratios))
 
-    def ratios(self, part_ratios: Floats) -> Floats:
-        """Return the similarity of each entry to a phrase, by its most similar part."""
-        if not len(self._starts):
-            return part_ratios
-        most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
-        return most
+    def ratios(self, part_ratios: Floats, size: int) -> Floats:
+        """Return, by number, the similarity of an entry to a phrase, by its most similar part."""
+        if self._starts is None:
+            numbers = np.fromiter(self._own, dtype=np.intp, count=len(self._own))
+            parts = np.fromiter(chain.from_iterable(self._own.values()), dtype=np.intp)
+            starts = np.cumsum([0, *map(len, self._own.values())])[:-1]
+            self._starts = numbers, parts, starts
+        numbers, parts, starts = self._starts
+        found = np.zeros(size)
+        if numbers.size:
+            found[numbers] = np.maximum.reduceat(part_ratios[parts], starts)
+        return found
 
     def nearest_text(self, part_ratios: Floats, number: int) -> tuple[MatchField, str]:
         """Return the text of an entry most similar to a phrase, and its part of the record."""
-        following = self._starts[number + 1 :]
-        own = self._numbers[self._starts[number] : following[0] if len(following) else None]
+        own = self._own[number]
         part = self._parts[own[int(part_ratios[own].argmax())]]
         return part.field, part.text
 
-    def _lengths_of_sums(self) -> Floats:
-        lengths = np.empty(len(self._parts))
-        for start in range(0, len(lengths), _AT_ONCE):
-            rows = slice(start, start + _AT_ONCE)
-            sums = self._texts[self._names[rows]] + self._texts[self._contexts[rows]]
-            lengths[rows] = np.linalg.norm(sums, axis=1)
-        return lengths
+
+class _Column:
+    """An array that grows at its end."""
+
+    def __init__(self, empty: NDArray[Any]) -> None:
+        self._room, self._n = empty, 0
+
+    @property
+    def now(self) -> NDArray[Any]:
+        """What was put in so far."""
+        return self._room[: self._n]
+
+    def extend(self, rows: NDArray[Any]) -> None:
+        n = self._n + len(rows)
+        if n > len(self._room):
+            room = np.empty((n + n // 2, *self._room.shape[1:]), dtype=self._room.dtype)
+            room[: self._n] = self.now
+            self._room = room
+        self._room[self._n : n] = rows
+        self._n = n
 
 
 def _all_parts(entry: Entry, said: Texts, common: Texts) -> Iterator[_Part]:

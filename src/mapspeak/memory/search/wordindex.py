@@ -4,13 +4,13 @@ import difflib
 import math
 import re
 import unicodedata
-from bisect import bisect_left
+from bisect import bisect_left, insort
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
-from itertools import takewhile
+from itertools import chain, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ from mapspeak.memory.search.answer import (
     MatchField,
     MatchKind,
 )
+
+
+MOST_KEPT = 65_536
+"""So many texts are taken apart once."""
 
 
 @cache
@@ -85,6 +89,7 @@ def content_words(text: str) -> Iterator[tuple[str, str]]:
             yield shown, word
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def content_stems(text: str) -> tuple[str, ...]:
     """Return the stems of the words that matter."""
     return tuple(stem(word) for _, word in content_words(text))
@@ -95,6 +100,7 @@ _BRITISH = re.compile(r"(?<=\w\w\w)(?:is(?=(?:e[drs]?|ers|ing|ation)$)|our(?=s?$
 """Endings as in "sanitiser", "colour" and "centre"."""
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def stem(word: str) -> str:
     """Cut an English ending off: plural, -ing, -ed, -er, a last e; spelt as in the US."""
     word = _BRITISH.sub(lambda found: _AMERICAN[found[0]], word)
@@ -140,14 +146,32 @@ class LookAlikes:
 class Vocabulary:
     """Index of the words of all records."""
 
-    def __init__(self, words: Iterable[str]) -> None:
-        self._words = sorted(set(words))
-        self._look_alikes = LookAlikes(self._words)
-        self._of_stem: dict[str, list[str]] = defaultdict(list)
-        for word in self._words:
-            self._of_stem[stem(word)].append(word)
-        self._stems = sorted(self._of_stem)
-        self._stems_backwards = sorted(own[::-1] for own in self._stems)
+    def __init__(self, words: Iterable[str] = ()) -> None:
+        self._of_stem: defaultdict[str, list[str]] = defaultdict(list)
+        self._stems: list[str] = []
+        self._stems_backwards: list[str] = []
+        self._look_alikes: LookAlikes | None = None
+        for word in sorted(set(words)):
+            self.add(word)
+
+    def add(self, word: str) -> None:
+        """Add a word that it has not."""
+        own = stem(word)
+        if own not in self._of_stem:
+            insort(self._stems, own)
+            insort(self._stems_backwards, own[::-1])
+        insort(self._of_stem[own], word)
+        self._look_alikes = None
+
+    def remove(self, word: str) -> None:
+        """Remove a word that it has."""
+        own = stem(word)
+        self._of_stem[own].remove(word)
+        if not self._of_stem[own]:
+            del self._of_stem[own]
+            del self._stems[bisect_left(self._stems, own)]
+            del self._stems_backwards[bisect_left(self._stems_backwards, own[::-1])]
+        self._look_alikes = None
 
     def is_doubtful(self, word: str) -> bool:
         """Whether a word is neither one of these nor a known one, and so perhaps misspelt."""
@@ -176,6 +200,8 @@ class Vocabulary:
     def _misspelt(self, word: str) -> list[str]:
         if len(word) < MIN_LETTERS or word in read_words():
             return []
+        if self._look_alikes is None:
+            self._look_alikes = LookAlikes(chain.from_iterable(self._of_stem.values()))
         return self._look_alikes.find(word, least_ratio=MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
 
 
@@ -184,6 +210,7 @@ def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
     return takewhile(lambda word: word.startswith(start), behind)
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def _letters(word: str) -> NDArray[np.int64]:
     return np.bincount([ord(letter) % _N_BUCKETS for letter in word], minlength=_N_BUCKETS)
 
@@ -216,48 +243,69 @@ class AskedWords:
 class WordIndex:
     """The words of records, each with the numbers of the records that say it."""
 
-    def __init__(self, records: Sequence[Texts]) -> None:
-        self._records = records
-        weights: dict[str, dict[int, float]] = defaultdict(dict)
-        # Many records say the same.
-        words_of: dict[str, list[str]] = {}
-        for number, texts in enumerate(records):
-            for field, text in texts:
-                said = _without_denied(field, text)
-                if said not in words_of:
-                    words_of[said] = [word for _, word in split_words(said)]
-                for word in words_of[said]:
-                    least = weights[word].get(number, 0.0)
-                    weights[word][number] = max(least, FIELD_WEIGHTS[field])
-        self._postings = {
-            word: (np.array(list(found)), np.array(list(found.values())))
-            for word, found in weights.items()
-        }
-        self._vocabulary = Vocabulary(self._postings)
+    def __init__(self) -> None:
+        self._records: dict[int, Texts] = {}
+        self._weights: dict[str, dict[int, float]] = {}
+        self._postings: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]] = {}
+        self._vocabulary = Vocabulary()
+
+    def add(self, number: int, texts: Texts) -> None:
+        """Add a record under a number that none has."""
+        self._records[number] = texts
+        for word, weight in _weigh_words(texts).items():
+            if word not in self._weights:
+                self._weights[word] = {}
+                self._vocabulary.add(word)
+            self._weights[word][number] = weight
+            self._postings.pop(word, None)
+
+    def remove(self, number: int) -> None:
+        """Remove the record of a number."""
+        for word in _weigh_words(self._records.pop(number)):
+            del self._weights[word][number]
+            self._postings.pop(word, None)
+            if not self._weights[word]:
+                del self._weights[word]
+                self._vocabulary.remove(word)
 
     def ask(self, phrase: str) -> tuple[AskedWords, ...]:
         """Return words of a phrase that say what is meant, and what the records have of them."""
         found = []
         for shown, compared in content_words(phrase):
             spellings = self._vocabulary.find_spellings(compared)
-            n_with = sum(len(self._postings[spelling][0]) for spelling in spellings)
+            n_with = sum(len(self._weights[spelling]) for spelling in spellings)
             weight = math.log1p(len(self._records) / max(n_with, 1))
             is_doubtful = self._vocabulary.is_doubtful(compared)
             found.append(AskedWords(shown, spellings, weight, is_doubtful))
         return tuple(found)
 
     def score_ratios(
-        self, asked: Sequence[AskedWords], kind_weights: Mapping[MatchKind, float] = KIND_WEIGHTS
+        self,
+        asked: Sequence[AskedWords],
+        kind_weights: Mapping[MatchKind, float] = KIND_WEIGHTS,
+        *,
+        size: int,
     ) -> NDArray[np.float64]:
-        """Return, for each record, how much of a phrase it says; rare words count more."""
-        found = np.zeros(len(self._records))
+        """Return, by number, how much of a phrase a record says; rare words count more.
+
+        Args:
+            size: More than every number.
+        """
+        found = np.zeros(size)
         for word in asked:
-            best = np.zeros(len(self._records))
+            best = np.zeros(size)
             for spelling, kind in word.spellings.items():
-                numbers, weights = self._postings[spelling]
+                numbers, weights = self._find_postings(spelling)
                 best[numbers] = np.maximum(best[numbers], weights * kind_weights[kind])
             found += word.weight * best
         return found / max(sum(word.weight for word in asked), 1e-9)
+
+    def _find_postings(self, word: str) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        if word not in self._postings:
+            found = self._weights[word]
+            numbers = np.fromiter(found, dtype=np.intp, count=len(found))
+            self._postings[word] = numbers, np.array(list(found.values()))
+        return self._postings[word]
 
     def explain(self, asked: Sequence[AskedWords], number: int) -> tuple[MatchEvidence, ...]:
         """Return at most one finding in a record for each word of a phrase, in their order."""
@@ -274,8 +322,22 @@ class WordIndex:
                 text=text,
                 kind=asked.spellings[compared],
             )
-            for field, text in self._records[number]
+            for field, text in self._records.get(number, ())
             for shown, compared in split_words(_without_denied(field, text))
             if compared in asked.spellings
         )
         return max(findings, key=lambda finding: finding.weight, default=None)
+
+
+def _weigh_words(texts: Texts) -> dict[str, float]:
+    weights: dict[str, float] = {}
+    for field, text in texts:
+        for word in _words_said(_without_denied(field, text)):
+            weights[word] = max(weights.get(word, 0.0), FIELD_WEIGHTS[field])
+    return weights
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _words_said(text: str) -> tuple[str, ...]:
+    """Return the words of a text, each once; many records say the same."""
+    return tuple(dict.fromkeys(word for _, word in split_words(text)))

@@ -1,21 +1,18 @@
 """From remembered places to things: the whole way, and each thing in words and numbers."""
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.things.joining import (
-    Group,
-    Posteriors,
-    join_sightings,
-)
+from mapspeak.memory.things.joining import Group, Posteriors, divide_views, join_sightings
 from mapspeak.memory.things.labels import group_names, name_the_same
-from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_waypoints
+from mapspeak.memory.things.likelihood import Seen, Surroundings, WeighedView, read_waypoints
 from mapspeak.memory.things.placing import Placement, measure_agreement, place, trust_range
 from mapspeak.memory.things.sight import (
     BODY_M,
@@ -39,13 +36,31 @@ ELSEWHERE_RAD = math.radians(30)
 """A view that points so far past a thing says that it is elsewhere."""
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Located:
     """Views of one thing, where it is, and how well each view goes with the others."""
 
-    group: Group
+    group: tuple[WeighedView, ...]
     placement: Placement | None
-    agreements: list[float]
+    agreements: tuple[float, ...]
+
+
+Solved = dict[tuple[WeighedView, ...], tuple[Located, ...]]
+Evidence = tuple[Located | None, tuple[WeighedView, ...], tuple[WeighedView, ...]]
+"""What a thing is made of: placed views of it, those without a direction, those against it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pool:
+    """The things of all views that bear related names; compared by identity.
+
+    Attributes:
+        solved: What was joined, by the views that may be joined with each other.
+        things: By what they are made of.
+    """
+
+    solved: Solved
+    things: dict[Evidence, Thing]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,18 +70,20 @@ class Things:
     Attributes:
         things: Those with most views first, then by label and place.
         sight: The map, ready for looking around in it.
-        surroundings: What each waypoint, and each of its standpoints, sees.
-        pools: The things of all views that bear related names, by these views.
+        seen: By the name of each waypoint.
+        pools: By all views that bear related names.
+        n_joined: How many views were joined anew to find them.
     """
 
     things: tuple[Thing, ...]
     sight: SightMap
-    surroundings: dict[Waypoint, Surroundings]
-    pools: dict[tuple[WeighedView, ...], tuple[Thing, ...]]
+    seen: Seen
+    pools: dict[tuple[WeighedView, ...], Pool]
+    n_joined: int = 0
 
     def find_sight_ratios(self, waypoint: Waypoint, points: FloatArray) -> FloatArray:
         """Return for each point how likely a waypoint has it in sight: less over furniture."""
-        pose, seen = waypoint.pose, self.surroundings[waypoint]
+        pose, seen = waypoint.pose, self._surroundings(waypoint)
         ways = points - (pose.x, pose.y)
         far_m = np.hypot(*ways.T)
         rays = bearing_index(np.arctan2(ways[:, 1], ways[:, 0]) - self.sight.grid.origin.yaw_rad)
@@ -83,7 +100,11 @@ class Things:
 
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
         """Return how far one sees towards a point over what one may see over."""
-        return float(self.surroundings[waypoint].far_m[self._ray(waypoint.pose, point)])
+        seen = self._surroundings(waypoint)
+        return float(seen.far_m[self._ray(waypoint.pose, point)])
+
+    def _surroundings(self, stand: Waypoint) -> Surroundings:
+        return next(each for each in self.seen[stand.name] if each.pose == stand.pose)
 
     def _ray(self, pose: Pose, point: Point) -> int:
         angle = pose.point.bearing_to(point) - self.sight.grid.origin.yaw_rad
@@ -105,17 +126,24 @@ def find_things(
     if earlier is None or not _is_of(earlier.sight, grid):
         earlier = None
     sight = earlier.sight if earlier else build_sight_map(grid)
-    surroundings = read_waypoints(
-        sight, semantic_map.waypoints, earlier.surroundings if earlier else {}
+    seen = read_waypoints(sight, semantic_map.waypoints, earlier.seen if earlier else {})
+    found = Things(things=(), sight=sight, seen=seen, pools={})
+    divided, known = _divide(seen), earlier.pools if earlier else {}
+    left = [pool for views, pool in known.items() if views not in divided]
+    before = Pool(
+        solved={views: each for pool in left for views, each in pool.solved.items()},
+        things={made_of: thing for pool in left for made_of, thing in pool.things.items()},
     )
-    found = Things(things=(), sight=sight, surroundings=surroundings, pools={})
-    known = earlier.pools if earlier else {}
-    pools = {
-        pool: known.get(pool) or _describe(found, _solve(sight, pool))
-        for pool in _divide(surroundings)
-    }
-    things = (thing for pool in pools.values() for thing in pool)
-    return replace(found, things=tuple(sorted(things, key=_rank)), pools=pools)
+    pools = {views: known.get(views) or _solve(found, views, before) for views in divided}
+    n_joined = sum(
+        len(part)
+        for views, pool in pools.items()
+        if views not in known
+        for part in pool.solved
+        if part not in before.solved
+    )
+    things = (thing for pool in pools.values() for thing in pool.things.values())
+    return replace(found, things=tuple(sorted(things, key=_rank)), pools=pools, n_joined=n_joined)
 
 
 def _is_of(sight: SightMap, grid: OccupancyGrid) -> bool:
@@ -124,44 +152,51 @@ def _is_of(sight: SightMap, grid: OccupancyGrid) -> bool:
     return old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
 
 
-def _divide(surroundings: dict[Waypoint, Surroundings]) -> list[tuple[WeighedView, ...]]:
+def _divide(seen: Seen) -> list[tuple[WeighedView, ...]]:
     """Return all sightings in pools of related labels, in an order that the file does not set."""
-    ordered = sorted(surroundings, key=_order)
-    every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
-    pool_of = {
-        label: i
-        for i, group in enumerate(group_names([s.landmark.label for s in every]))
-        for label in group
+    of_label: dict[str, list[WeighedView]] = {}
+    for stand in chain.from_iterable(seen.values()):
+        for each in stand.sightings:
+            of_label.setdefault(each.landmark.label, []).append(each)
+    return [
+        tuple(sorted((each for label in group for each in of_label[label]), key=_order))
+        for group in group_names(list(of_label))
+    ]
+
+
+def _order(view: WeighedView) -> tuple[str, str, float, float, float, int]:
+    waypoint, pose = view.waypoint, view.waypoint.pose
+    return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad, view.number
+
+
+def _solve(found: Things, views: Sequence[WeighedView], before: Pool) -> Pool:
+    """Join views of related names; what is known of those that may be joined is taken as it is."""
+    solved = {
+        part: before.solved.get(part) or _join(found.sight, part)
+        for part in divide_views(found.sight, [v for v in views if v.likelihood is not None])
     }
-    pools: dict[int, list[WeighedView]] = {}
-    for each in every:
-        pools.setdefault(pool_of[each.landmark.label], []).append(each)
-    return [tuple(pools[i]) for i in sorted(pools)]
+    located = [each for joined in solved.values() for each in joined]
+    added: defaultdict[Located | None, list[WeighedView]] = defaultdict(list)
+    for view in views:
+        if view.likelihood is None:
+            added[_find_nearest(located, added, view)].append(view)
+    against = _find_against(found, located, added)
+    made_of: list[Evidence] = [(None, (view,), ()) for view in added.get(None, ())]
+    made_of += (
+        (each, tuple(added.get(each, ())), past)
+        for each, past in zip(located, against, strict=True)
+    )
+    things = {each: before.things.get(each) or _describe(each) for each in made_of}
+    return Pool(solved=solved, things=things)
 
 
-def _order(waypoint: Waypoint) -> tuple[str, str, float, float, float]:
-    pose = waypoint.pose
-    return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad
-
-
-def _solve(sight: SightMap, pool: Sequence[WeighedView]) -> list[Located]:
-    posteriors = Posteriors(sight)
-    placed = [each for each in pool if each.likelihood is not None]
-    located = []
-    for group in join_sightings(posteriors, placed) if placed else []:
+def _join(sight: SightMap, views: Sequence[WeighedView]) -> tuple[Located, ...]:
+    posteriors, located = Posteriors(sight), []
+    for group in join_sightings(posteriors, views):
         shares = measure_agreement(sight, group)
         placement = _place(posteriors, _agreeing(group, shares))
-        located.append(Located(group=group, placement=placement, agreements=list(shares)))
-    for view in pool:
-        if view.likelihood is None:
-            near = _find_nearest(located, view)
-            if near is None:
-                near = Located(group=[], placement=None, agreements=[])
-                located.append(near)
-            near.group.append(view)
-            # A view without a direction says nothing of the place.
-            near.agreements.append(1.0)
-    return located
+        located.append(Located(group=tuple(group), placement=placement, agreements=shares))
+    return tuple(located)
 
 
 def _place(posteriors: Posteriors, group: Group) -> Placement:
@@ -187,44 +222,60 @@ def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
     return kept if len(kept) >= 2 else group
 
 
-def _find_nearest(located: Sequence[Located], view: WeighedView) -> Located | None:
+def _find_nearest(
+    located: Sequence[Located],
+    added: Mapping[Located | None, Sequence[WeighedView]],
+    view: WeighedView,
+) -> Located | None:
     """Find the nearest thing of the name of a view without a direction."""
     here = view.waypoint.pose.point
     near = [
         (here.distance_to(each.placement.position), i)
         for i, each in enumerate(located)
         if each.placement is not None
+        and here.distance_to(each.placement.position) <= PLAIN_SIGHT_M
         and all(
             other.waypoint is not view.waypoint
             and name_the_same(other.landmark.label, view.landmark.label)
-            for other in each.group
+            for other in (*each.group, *added.get(each, ()))
         )
     ]
-    off_m, i = min(near, default=(math.inf, -1))
-    return located[i] if off_m <= PLAIN_SIGHT_M else None
+    return located[min(near)[1]] if near else None
 
 
-def _describe(found: Things, pool: Sequence[Located]) -> tuple[Thing, ...]:
-    alone = [each for each in pool if len(each.group) == 1 and each.placement is not None]
-    return tuple(_describe_one(each, _against(found, each, alone)) for each in pool)
+def _find_against(
+    found: Things, located: Sequence[Located], added: Mapping[Located | None, Sequence[WeighedView]]
+) -> Iterator[tuple[WeighedView, ...]]:
+    """Return for each thing the lone views of its name that point past it.
 
-
-def _against(found: Things, located: Located, alone: Sequence[Located]) -> list[WeighedView]:
-    """Find lone views of the name, from where the thing is in plain sight, that point past it."""
-    if located.placement is None or len(located.group) < 2:
-        return []
-    position, own = located.placement.position, [each.waypoint for each in located.group]
-    at = np.array([[position.x, position.y]])
-    return [
-        other
-        for (other,) in (each.group for each in alone)
-        if other.waypoint not in own
-        and other.landmark.bearing_rad is not None
-        and other.waypoint.pose.point.distance_to(position) <= PLAIN_SIGHT_M
-        and _off_rad(other, position) >= ELSEWHERE_RAD
-        and name_the_same(other.landmark.label, located.group[0].landmark.label)
-        and found.find_sight_ratios(other.waypoint, at)[0] > LIKELY_RATIO
+    Those are meant from where the thing is in plain sight; a thing of one view has none.
+    """
+    is_lone = [len(each.group) + len(added.get(each, ())) == 1 for each in located]
+    alone = [
+        each.group[0]
+        for each, is_one in zip(located, is_lone, strict=True)
+        if is_one and each.group[0].landmark.bearing_rad is not None
     ]
+    places = np.array([(v.waypoint.pose.x, v.waypoint.pose.y) for v in alone]).reshape(-1, 2)
+    for each, is_one in zip(located, is_lone, strict=True):
+        if each.placement is None or is_one:
+            yield ()
+            continue
+        at = each.placement.position
+        near = np.flatnonzero(np.hypot(*(places - (at.x, at.y)).T) <= PLAIN_SIGHT_M).tolist()
+        yield tuple(alone[i] for i in near if _points_past(found, alone[i], each.group, at))
+
+
+def _points_past(
+    found: Things, view: WeighedView, group: Sequence[WeighedView], position: Point
+) -> bool:
+    at = np.array([[position.x, position.y]])
+    return (
+        all(view.waypoint is not each.waypoint for each in group)
+        and _off_rad(view, position) >= ELSEWHERE_RAD
+        and name_the_same(view.landmark.label, group[0].landmark.label)
+        and bool(found.find_sight_ratios(view.waypoint, at)[0] > LIKELY_RATIO)
+    )
 
 
 def _off_rad(sighting: WeighedView, point: Point) -> float:
@@ -247,12 +298,16 @@ _SAME_PLACE_M = 0.3
 """Views from nearer to each other share their mistakes and count once."""
 
 
-def _describe_one(located: Located, conflicting: Iterable[WeighedView]) -> Thing:
-    placement = located.placement
-    ordered = sorted(located.group, key=lambda each: name_key(each.waypoint.name))
+def _describe(made_of: Evidence) -> Thing:
+    located, unplaced, conflicting = made_of
+    placement = located.placement if located else None
+    views = (*located.group, *unplaced) if located else unplaced
+    # A view without a direction says nothing of the place.
+    shares = (*(located.agreements if located else ()), *(1.0 for _ in unplaced))
+    ordered = sorted(views, key=lambda each: name_key(each.waypoint.name))
     labels = _by_votes(each.landmark.label for each in ordered)
     position = placement.position if placement else None
-    apart = list(_from_different_places(located))
+    apart = list(_from_different_places(zip(views, shares, strict=True)))
     times = (each.waypoint.dated(each.landmark).recorded_at for each in ordered)
     seen_at = [each for each in times if each is not None]
     return Thing(
@@ -301,9 +356,11 @@ def _confidence(apart: Iterable[tuple[WeighedView, float]]) -> float:
     return odds / (1 + odds)
 
 
-def _from_different_places(located: Located) -> Iterator[tuple[WeighedView, float]]:
+def _from_different_places(
+    views: Iterable[tuple[WeighedView, float]],
+) -> Iterator[tuple[WeighedView, float]]:
     places = list[Point]()
-    for each, agreement in zip(located.group, located.agreements, strict=True):
+    for each, agreement in views:
         here = each.waypoint.pose.point
         if all(here.distance_to(other) >= _SAME_PLACE_M for other in places):
             places.append(here)

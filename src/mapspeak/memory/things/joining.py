@@ -1,13 +1,15 @@
 """Which views are of one thing: they may share a label and can meet at one place.
 
-Votes of all views with one name are added up over the map. The place with most votes is a thing;
-the views that speak of it are taken out, at most one from each pose, since who names two sees
-two, and none whose range puts it elsewhere. What is left votes again. Then every view may change
+Views that speak of no place together are divided first, so that a new view costs what it touches.
+Votes of the others are added up over the map. The place with most votes is a thing; the views that
+it explains better than a thing of their own would are taken out, at most one from each pose, since
+who names two sees two, and none whose range puts it elsewhere. What is left votes again. Then every view may change
 to the thing that explains it best, and things that are better explained as one are joined.
 """
 
 from collections.abc import Iterator, Sequence
 
+import cv2
 import numpy as np
 
 from mapspeak.memory.merging import SAME_SPOT_M
@@ -26,8 +28,6 @@ from mapspeak.spatial.grid import FloatArray, IntArray
 
 Group = list[WeighedView]
 
-LEAST_RATIO = 1.0
-"""A view speaks of a place that it makes likelier than it was."""
 N_SWEEPS = 2
 _NEAR_M = 2.0
 _THINGS_PER_CELL = 0.01
@@ -52,6 +52,7 @@ class _Ballot:
         self.starts: IntArray = np.append(starts, len(cells))
         self.voters: IntArray = np.repeat(np.arange(len(sizes)), sizes)[order]
         self.ratios: FloatArray = np.concatenate([each.ratios for each in likelihoods])[order]
+        self.least_ratios: FloatArray = np.array([each.least_ratio for each in sightings])
         self._n_left = np.diff(self.starts)
         self._at = np.repeat(np.arange(len(self.places)), self._n_left)
         self._weights = np.log1p(self.ratios)
@@ -84,6 +85,30 @@ class _Ballot:
         self.votes[at] -= self._weights[mine]
         self._n_left[at] -= 1
         self.votes[at[self._n_left[at] == 0]] = -np.inf
+
+
+def divide_views(
+    sight: SightMap, views: Sequence[WeighedView]
+) -> Iterator[tuple[WeighedView, ...]]:
+    """Divide views by whether they, over others, speak of places beside each other.
+
+    Views of different parts are never of one thing, so that each part is joined for itself.
+    """
+    spoken_of = [view.spoken_of for view in views]
+    mask = np.zeros(sight.rows.shape, dtype=np.uint8)
+    mask.ravel()[np.concatenate([np.empty(0, dtype=np.intp), *spoken_of])] = 1
+    # A place of most votes is spoken of by views of its neighbours, too.
+    n_areas, areas = cv2.connectedComponents(cv2.dilate(mask, np.ones((3, 3), dtype=np.uint8)))
+    owner = np.arange(n_areas)
+    touched = [np.unique(areas.ravel()[cells]) for cells in spoken_of]
+    for each in touched:
+        owners = np.unique(owner[each])
+        if len(owners) > 1:
+            owner[np.isin(owner, owners)] = owners[0]
+    parts: dict[int, list[WeighedView]] = {}
+    for number, (view, each) in enumerate(zip(views, touched, strict=True)):
+        parts.setdefault(int(owner[each[0]]) if each.size else -1 - number, []).append(view)
+    return map(tuple, parts.values())
 
 
 def join_sightings(posteriors: "Posteriors", sightings: Sequence[WeighedView]) -> list[Group]:
@@ -119,7 +144,7 @@ def _take_peaks(sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ball
         ratios = np.zeros(len(sightings))
         np.maximum.at(ratios, ballot.voters[said], ballot.ratios[said])
         ratios[~is_left] = 0.0
-        chosen = _choose(sightings, ratios)
+        chosen = _choose(sightings, ratios, ballot.least_ratios)
         if not chosen:
             # Nothing that is left can be there.
             ballot.votes[near] = -np.inf
@@ -140,12 +165,13 @@ def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
     return np.asarray(found[ballot.places[found] == cells], dtype=np.intp)
 
 
-def _choose(sightings: Sequence[WeighedView], ratios: FloatArray) -> list[int]:
+def _choose(
+    sightings: Sequence[WeighedView], ratios: FloatArray, least_ratios: FloatArray
+) -> list[int]:
     """Return the views that speak of a place, the strongest first, one from each pose."""
     chosen: list[int] = []
-    for i in np.argsort(-ratios, kind="stable").tolist():
-        if ratios[i] < LEAST_RATIO:
-            break
+    speaking = np.flatnonzero(ratios >= least_ratios)
+    for i in speaking[np.argsort(-ratios[speaking], kind="stable")].tolist():
         if _fits(sightings[i], (sightings[j] for j in chosen)):
             chosen.append(i)
     return chosen
@@ -180,10 +206,10 @@ def _sweep(
     for j, group in enumerate(groups):
         ratios[:, j] = _explain(ballot, posteriors.of(group), len(sightings))
         if len(group) == 1:
-            ratios[number[id(group[0])], j] = LEAST_RATIO
+            ratios[number[id(group[0])], j] = group[0].least_ratio
     taken: list[Group] = [[] for _ in groups]
     is_left = np.ones(len(sightings), dtype=np.bool_)
-    rows, cols = np.nonzero(ratios >= LEAST_RATIO)
+    rows, cols = np.nonzero(ratios >= ballot.least_ratios[:, None])
     for k in np.argsort(-ratios[rows, cols], kind="stable").tolist():
         i, j = int(rows[k]), int(cols[k])
         if is_left[i] and _fits(sightings[i], iter(taken[j])):
