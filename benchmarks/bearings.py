@@ -24,7 +24,8 @@ from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import stand_at
 from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import Recollector, RememberedThing
+from mapspeak.worldmodel.recollection import Recollector
+from mapspeak.worldmodel.remembered import RememberedThing
 from tools.worldgen import draw_plan, style_names
 
 __all__ = ["measure"]

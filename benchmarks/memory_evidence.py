@@ -23,7 +23,8 @@ from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.merging import merge_waypoint
 from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import Recollector, RememberedThing
+from mapspeak.worldmodel.recollection import Recollector
+from mapspeak.worldmodel.remembered import RememberedThing
 from tools.worldgen import draw_plan, style_names
 
 __all__ = ["measure"]

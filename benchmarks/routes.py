@@ -22,7 +22,7 @@ from mapspeak.driving.routes.planning import RoutePlan, plan_route
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace
 
 __all__ = ["measure"]
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.memory.things.approach import OVERLOOK_M
+from mapspeak.memory.things.approach import LOOK_AGAIN_M
 from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.places.recall.asking import RecallDoubt, RecallQuery, find_doubt, recall
 from remembering import EXTINGUISHER, look, looks_at, world_of
@@ -24,7 +24,7 @@ def test_a_thing_that_may_be_anywhere_on_a_line_is_looked_for_from_where_it_is_i
     world = world_of(look("west", 0.7, 2.3, ("crate", EXTINGUISHER)))
     (first, *_) = recall(world, RecallQuery(words="crate")).candidates
     assert first.uncertainty_m is not None
-    assert first.uncertainty_m > OVERLOOK_M
+    assert first.uncertainty_m > LOOK_AGAIN_M
     assert not first.is_faced
     (crate,) = world.things
     assert crate.thing.whereabouts is not None

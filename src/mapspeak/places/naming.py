@@ -14,7 +14,7 @@ from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 MOST_NAMED = 12
 MOST_GUESSES = 3

@@ -14,7 +14,7 @@ from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.viewing import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
 from mapspeak.worldmodel.model import WorldModel, find_crossing
-from mapspeak.worldmodel.recollection import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision
 
 EVERY_M = 1.0
@@ -172,7 +172,7 @@ def find_stand_off(world: WorldModel, remembered: RememberedThing) -> Pose | Non
 
 
 def find_overlook_of(world: WorldModel, remembered: RememberedThing) -> Pose | None:
-    """Return from where to look for a thing that may be anywhere in 1.5 m; None for others."""
+    """Return from where to look for a thing that may be anywhere in 2.5 m; None for others."""
     thing, known = remembered.thing, world.reach.overlooks
     if thing.whereabouts is None or (thing.uncertainty_m or 0.0) <= OVERLOOK_M:
         return None

@@ -18,7 +18,7 @@ from mapspeak.places.naming import (
 from mapspeak.places.standing import find_stand_off, stand_before
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 
 RANKS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 ORDERED = re.compile(

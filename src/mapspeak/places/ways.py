@@ -10,7 +10,7 @@ from mapspeak.places.standing import choose_crossing, choose_standing_point, sta
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

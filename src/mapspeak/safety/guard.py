@@ -213,7 +213,7 @@ class Guard:
 
     Attributes:
         hold: What keeps the robot standing.
-        wall_clock: The operator's.
+        wall_clock: The operator's; of a robot under a virtual clock one that moves on as that does.
         robot: What the operator calls it; empty leaves that to the robot.
         address: Where the robot is; empty for one that no other process can reach.
     """

@@ -31,14 +31,8 @@ from mapspeak.spatial.frontiers import (
 )
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, RoomMap
-from mapspeak.worldmodel.recollection import (
-    Judge,
-    Recollection,
-    Recollector,
-    RememberedPlace,
-    RememberedThing,
-    number_places,
-)
+from mapspeak.worldmodel.recollection import Judge, Recollection, Recollector
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing, number_places
 from mapspeak.worldmodel.revision import MapRevision
 
 AROUND_M = 0.5

@@ -8,62 +8,34 @@ import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from itertools import chain, repeat
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from mapspeak.errors import ConfigError
-from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
 from mapspeak.memory.things.finding import Things, find_things
-from mapspeak.memory.things.labels import name_the_same
-from mapspeak.memory.things.thing import Category, Thing
+from mapspeak.memory.things.thing import Category
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.rooms.identity import match_best_first
 from mapspeak.worldmodel.keptthings import keep_things, load_things
+from mapspeak.worldmodel.remembered import (
+    Remembered,
+    RememberedPlace,
+    RememberedThing,
+    number_places,
+    number_things,
+)
 
 logger = logging.getLogger(__name__)
 
 KEPT_FROM = 1000
 """Things are kept once so many views were joined anew; fewer are joined in a moment."""
 THINGS_FILE = "things.cache"
-SAME_THING_M = 1.0
-"""A thing of the same name within this distance of an earlier one is that one, seen better."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
-class RememberedPlace:
-    """A waypoint under its id, "W1" for the first in the file; compared by identity."""
-
-    id: str
-    waypoint: Waypoint
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
-class RememberedThing:
-    """A thing that was seen from remembered places; compared by identity.
-
-    Attributes:
-        id: "T1"; it stays while the thing does.
-    """
-
-    id: str
-    thing: Thing
-
-    @property
-    def point(self) -> Point:
-        """Where it is; of one without a position, where it was seen from."""
-        return self.thing.position or self.thing.supporting[0].place
-
-
-Remembered = RememberedPlace | RememberedThing
 
 
 class Search:
@@ -315,78 +287,6 @@ class Recollector:
             n_named=n_named,
             search=self._search,
         )
-
-
-def number_places(
-    waypoints: Sequence[Waypoint], earlier: Sequence[RememberedPlace] = ()
-) -> tuple[RememberedPlace, ...]:
-    """Return waypoints as remembered places with ids, in the order of the file.
-
-    Args:
-        earlier: Those of before, which are kept where they are the same.
-    """
-    return tuple(
-        before
-        if before is not None and before.waypoint is waypoint
-        else RememberedPlace(id=f"W{number}", waypoint=waypoint)
-        for number, (waypoint, before) in enumerate(
-            zip(waypoints, chain(earlier, repeat(None))), start=1
-        )
-    )
-
-
-def number_things(
-    things: Sequence[Thing], earlier: Sequence[RememberedThing], *, n_named: int
-) -> tuple[tuple[RememberedThing, ...], int]:
-    """Return things under the ids that they had before, and new things under new ones.
-
-    Args:
-        n_named: How many ids were ever given; a thing that is gone leaves its id unused.
-
-    Returns:
-        The things in the order of their ids, and how many ids were ever given.
-    """
-    # By identity first: that is most of them, and to compare them as values is slow.
-    very_same = {id(each.thing): each for each in earlier}
-    ids: dict[int, RememberedThing] = {
-        number: very_same.pop(id(thing))
-        for number, thing in enumerate(things)
-        if id(thing) in very_same
-    }
-    same = {each.thing: each for each in very_same.values()}
-    for number, thing in enumerate(things):
-        if number not in ids and thing in same:
-            ids[number] = replace(same.pop(thing), thing=thing)
-    new = [number for number in range(len(things)) if number not in ids]
-    gone = list(same.values())
-    seen_better = match_best_first(
-        ((rank, number), each.id, number)
-        for number in new
-        for each in gone
-        if (rank := _sameness(things[number], each.thing)) is not None
-    )
-    for number, thing_id in seen_better.items():
-        ids[number] = RememberedThing(id=thing_id, thing=things[number])
-    for number in new:
-        if number not in ids:
-            n_named += 1
-            ids[number] = RememberedThing(id=f"T{n_named}", thing=things[number])
-    return tuple(sorted(ids.values(), key=lambda each: int(each.id[1:]))), n_named
-
-
-def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:
-    """Rank how surely one thing is another that was known before; None for another thing."""
-    if not name_the_same(thing.label, before.label):
-        return None
-    n_shared = len(_views_of(thing) & _views_of(before))
-    if thing.position is None or before.position is None:
-        return (-n_shared, 0.0) if n_shared else None
-    away_m = thing.position.distance_to(before.position)
-    return (-n_shared, away_m) if n_shared or away_m <= SAME_THING_M else None
-
-
-def _views_of(thing: Thing) -> set[tuple[str, str]]:
-    return {(view.waypoint, view.landmark.label) for view in thing.supporting}
 
 
 def _place_entry(place: RememberedPlace) -> Entry:

@@ -1,12 +1,13 @@
 """The robots to serve, and the configuration of each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mapspeak.cli.shared.options import GuardChoice, build_guard, data_folder
+from mapspeak.cli.shared.options import GuardChoice, build_guard, data_folder, wall_clock
 from mapspeak.cli.shared.robots import (
     RobotChoice,
     file_for,
@@ -18,6 +19,7 @@ from mapspeak.cli.shared.robots import (
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
+    from mapspeak.robot import Robot
     from mapspeak.ros.port import RosConnection
     from mapspeak.session import Session
 
@@ -97,6 +99,8 @@ async def open_session(
     choice = start.choice
     guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)
     served = await links.enter_async_context(open_served_robot(choice))
+    if choice.clock == "virtual":
+        guard = replace(guard, wall_clock=_follow(served.robot))
     file = start.memory
     if file is None:
         folder = scratch / name if served.ros is None else data_folder()
@@ -111,3 +115,9 @@ async def open_session(
         skilled=served.skilled,
     )
     return session, served.ros
+
+
+def _follow(robot: "Robot") -> Callable[[], datetime]:
+    """Return a calendar that moves on as a robot's clock does, from the operator's present."""
+    began = wall_clock() - timedelta(seconds=robot.now_s)
+    return lambda: began + timedelta(seconds=robot.now_s)

@@ -19,7 +19,7 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.viewing import floor_by_heading, heading_index, heading_rad
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace
 
 LEAST_AREA_M2 = 1.0
 """Less unseen floor than this in view is not worth a look."""

@@ -24,7 +24,6 @@ from mapspeak.memory.search.answer import (
     MatchKind,
 )
 
-
 MOST_KEPT = 65_536
 """So many texts are taken apart once."""
 

@@ -5,6 +5,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from operator import itemgetter
 
 import numpy as np
 
@@ -45,6 +46,7 @@ class Located:
     agreements: tuple[float, ...]
 
 
+Rank = tuple[int, str, float, float, tuple[str, ...]]
 Solved = dict[tuple[WeighedView, ...], tuple[Located, ...]]
 Evidence = tuple[Located | None, tuple[WeighedView, ...], tuple[WeighedView, ...]]
 """What a thing is made of: placed views of it, those without a direction, those against it."""
@@ -57,10 +59,12 @@ class Pool:
     Attributes:
         solved: What was joined, by the views that may be joined with each other.
         things: By what they are made of.
+        ranked: The same, each with its rank among all things.
     """
 
     solved: Solved
     things: dict[Evidence, Thing]
+    ranked: tuple[tuple[Rank, Thing], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,14 +75,14 @@ class Things:
         things: Those with most views first, then by label and place.
         sight: The map, ready for looking around in it.
         seen: By the name of each waypoint.
-        pools: By all views that bear related names.
+        pools: By the views that bear related names.
         n_joined: How many views were joined anew to find them.
     """
 
     things: tuple[Thing, ...]
     sight: SightMap
     seen: Seen
-    pools: dict[tuple[WeighedView, ...], Pool]
+    pools: dict[frozenset[WeighedView], Pool]
     n_joined: int = 0
 
     def find_sight_ratios(self, waypoint: Waypoint, points: FloatArray) -> FloatArray:
@@ -142,8 +146,9 @@ def find_things(
         for part in pool.solved
         if part not in before.solved
     )
-    things = (thing for pool in pools.values() for thing in pool.things.values())
-    return replace(found, things=tuple(sorted(things, key=_rank)), pools=pools, n_joined=n_joined)
+    ranked = sorted(chain.from_iterable(p.ranked for p in pools.values()), key=itemgetter(0))
+    things = tuple(thing for _, thing in ranked)
+    return replace(found, things=things, pools=pools, n_joined=n_joined)
 
 
 def _is_of(sight: SightMap, grid: OccupancyGrid) -> bool:
@@ -152,25 +157,27 @@ def _is_of(sight: SightMap, grid: OccupancyGrid) -> bool:
     return old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
 
 
-def _divide(seen: Seen) -> list[tuple[WeighedView, ...]]:
-    """Return all sightings in pools of related labels, in an order that the file does not set."""
+def _divide(seen: Seen) -> list[frozenset[WeighedView]]:
+    """Return all sightings in pools of related labels."""
     of_label: dict[str, list[WeighedView]] = {}
     for stand in chain.from_iterable(seen.values()):
         for each in stand.sightings:
             of_label.setdefault(each.landmark.label, []).append(each)
     return [
-        tuple(sorted((each for label in group for each in of_label[label]), key=_order))
+        frozenset(each for label in group for each in of_label[label])
         for group in group_names(list(of_label))
     ]
 
 
 def _order(view: WeighedView) -> tuple[str, str, float, float, float, int]:
+    """Return where a view stands in an order that the file does not set."""
     waypoint, pose = view.waypoint, view.waypoint.pose
     return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad, view.number
 
 
-def _solve(found: Things, views: Sequence[WeighedView], before: Pool) -> Pool:
+def _solve(found: Things, pool: Iterable[WeighedView], before: Pool) -> Pool:
     """Join views of related names; what is known of those that may be joined is taken as it is."""
+    views = sorted(pool, key=_order)
     solved = {
         part: before.solved.get(part) or _join(found.sight, part)
         for part in divide_views(found.sight, [v for v in views if v.likelihood is not None])
@@ -187,7 +194,8 @@ def _solve(found: Things, views: Sequence[WeighedView], before: Pool) -> Pool:
         for each, past in zip(located, against, strict=True)
     )
     things = {each: before.things.get(each) or _describe(each) for each in made_of}
-    return Pool(solved=solved, things=things)
+    ranked = sorted(((_rank(each), each) for each in things.values()), key=itemgetter(0))
+    return Pool(solved=solved, things=things, ranked=tuple(ranked))
 
 
 def _join(sight: SightMap, views: Sequence[WeighedView]) -> tuple[Located, ...]:
@@ -284,7 +292,7 @@ def _off_rad(sighting: WeighedView, point: Point) -> float:
     return abs(math.remainder(pose.point.bearing_to(point) - ahead, math.tau))
 
 
-def _rank(thing: Thing) -> tuple[int, str, float, float, tuple[str, ...]]:
+def _rank(thing: Thing) -> Rank:
     at = thing.position or Point(math.inf, math.inf)
     return (-len(thing.supporting), thing.label, at.x, at.y, thing.waypoints)
 

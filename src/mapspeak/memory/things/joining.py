@@ -3,8 +3,9 @@
 Views that speak of no place together are divided first, so that a new view costs what it touches.
 Votes of the others are added up over the map. The place with most votes is a thing; the views that
 it explains better than a thing of their own would are taken out, at most one from each pose, since
-who names two sees two, and none whose range puts it elsewhere. What is left votes again. Then every view may change
-to the thing that explains it best, and things that are better explained as one are joined.
+who names two sees two, and none whose range puts it elsewhere. What is left votes again. Then every
+view may change to the thing that explains it best, and things that are better explained as one are
+joined.
 """
 
 from collections.abc import Iterator, Sequence

@@ -236,10 +236,11 @@ Seen = Mapping[str, tuple[Surroundings, ...]]
 def read_waypoints(sight: SightMap, waypoints: Sequence[Waypoint], known: Seen) -> Seen:
     """Return what is seen from everywhere; what is known of an equal waypoint is taken as it is."""
     read: dict[str, tuple[Surroundings, ...]] = {}
-    new = []
+    new: list[tuple[Waypoint, Waypoint]] = []
     for waypoint in waypoints:
-        before = known.get(waypoint.name, ())
-        kept = tuple(each for each in before if each.of is waypoint or each.of == waypoint)
+        kept = known.get(waypoint.name, ())
+        if len(kept) != 1 or kept[0].of is not waypoint:
+            kept = tuple(each for each in kept if each.of is waypoint or each.of == waypoint)
         read[waypoint.name] = read.get(waypoint.name, ()) + kept
         new += () if kept else ((waypoint, stand) for stand in waypoint.standpoints)
     near_m, far_m = look_around(sight, [stand.pose for _, stand in new])
@@ -256,7 +257,7 @@ def _read(
         (Category.SAFETY, waypoint.safety_landmarks),
         (Category.FUNCTIONAL, waypoint.functional_landmarks),
     )
-    sightings = []
+    sightings: list[WeighedView] = []
     for category, landmarks in sorted_in:
         for landmark in landmarks:
             likelihood = weigh_view(sight, outlook, waypoint.pose, landmark)

@@ -19,7 +19,7 @@ from mapspeak.places.relations.choosing import stand_at
 from mapspeak.places.standing import find_overlook_of
 from mapspeak.places.things import split_room
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import Remembered, RememberedPlace, RememberedThing
 
 NEAR_M = 5.0
 

@@ -7,7 +7,7 @@ from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_vie
 from mapspeak.places.naming import AmbiguousPlaceError
 from mapspeak.places.things import THING_ID, find_things
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 AROUND_M = 5.0
 """Largest distance from the robot to a thing that a person says is gone."""

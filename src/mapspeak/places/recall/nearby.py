@@ -7,7 +7,7 @@ from mapspeak.places.naming import no_such_place
 from mapspeak.places.recall.asking import last_seen
 from mapspeak.places.things import THING_ID, find_things
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 
 NEVER = datetime.min.replace(tzinfo=UTC)
 

@@ -20,7 +20,7 @@ from mapspeak.places.things import find_thing, place_of
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 
 def find_place(world: WorldModel, words: str) -> Place:

@@ -28,7 +28,7 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 ROBOT = "the robot"
 AROUND_DOOR_M = 0.6

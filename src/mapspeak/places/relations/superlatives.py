@@ -16,7 +16,7 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace
 
 Sized = Region | Door | Frontier
 

@@ -20,7 +20,7 @@ from mapspeak.spatial.viewing import (
     is_in_sight,
 )
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 
 AWAY_M = 2.0
 """Preferred distance from which to look at a door or a point."""

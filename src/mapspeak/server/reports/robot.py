@@ -21,7 +21,7 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_places_left
 from mapspeak.server.text.wording import say_elsewhere, say_pose, say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
-from mapspeak.worldmodel.recollection import RememberedPlace, number_places
+from mapspeak.worldmodel.remembered import RememberedPlace, number_places
 
 MOST_NAMED = 12
 MOST_PLACES = 20

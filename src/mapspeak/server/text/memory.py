@@ -23,7 +23,7 @@ from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 
 
 def say_age(moment: datetime, now: datetime) -> str:

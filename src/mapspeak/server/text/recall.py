@@ -6,14 +6,14 @@ from mapspeak.geometry import Point
 from mapspeak.memory.quoting import name_key, quote, quote_name
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.memory.store.forgetting import Forgotten
-from mapspeak.memory.things.approach import OVERLOOK_M
+from mapspeak.memory.things.approach import LOOK_AGAIN_M
 from mapspeak.memory.things.thing import Thing
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
 from mapspeak.server.text.offered import lead
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace
 
 LONGEST_QUOTE = 120
 MOST_LEFT_NAMED = 100
@@ -126,7 +126,7 @@ def _say_look(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
     """Ask for a look at what was found; nothing where it is sure."""
     if doubt is None or first.position is None:
         return ""
-    if (first.uncertainty_m or 0.0) > OVERLOOK_M:
+    if (first.uncertainty_m or 0.0) > LOOK_AGAIN_M:
         return lead(LOOK_AGAIN)
     return "Look before you rely on it."
 

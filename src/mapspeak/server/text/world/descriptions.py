@@ -31,7 +31,7 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.spatial.viewing import HALF_VIEW_RAD
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 MOST_THINGS = 20
 MOST_VIEWS = 12

@@ -21,7 +21,7 @@ from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.spatial.viewing import CameraView, mask_pictured, outline_unpictured
 from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace
 
 Item = TypeVar("Item")
 

@@ -42,7 +42,7 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import CorridorWalk, Door, DoorSide, PassedDoor, Region, RoomClass
 from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.recollection import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace
 
 MOST_WALKS = 6
 AGAIN = "New or changed since your last look:"

@@ -1,0 +1,114 @@
+"""Remembered places and things under ids that stay while these do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, repeat
+
+from mapspeak.geometry import Point
+from mapspeak.memory import Waypoint
+from mapspeak.memory.things.labels import name_the_same
+from mapspeak.memory.things.thing import Thing
+from mapspeak.spatial.rooms.identity import match_best_first
+
+SAME_THING_M = 1.0
+"""A thing of the same name within this distance of an earlier one is that one, seen better."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
+class RememberedPlace:
+    """A waypoint under its id, "W1" for the first in the file; compared by identity."""
+
+    id: str
+    waypoint: Waypoint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
+class RememberedThing:
+    """A thing that was seen from remembered places; compared by identity.
+
+    Attributes:
+        id: "T1"; it stays while the thing does.
+    """
+
+    id: str
+    thing: Thing
+
+    @property
+    def point(self) -> Point:
+        """Where it is; of one without a position, where it was seen from."""
+        return self.thing.position or self.thing.supporting[0].place
+
+
+Remembered = RememberedPlace | RememberedThing
+
+
+def number_places(
+    waypoints: Sequence[Waypoint], earlier: Sequence[RememberedPlace] = ()
+) -> tuple[RememberedPlace, ...]:
+    """Return waypoints as remembered places with ids, in the order of the file.
+
+    Args:
+        earlier: Those of before, which are kept where they are the same.
+    """
+    return tuple(
+        before
+        if before is not None and before.waypoint is waypoint
+        else RememberedPlace(id=f"W{number}", waypoint=waypoint)
+        for number, (waypoint, before) in enumerate(
+            zip(waypoints, chain(earlier, repeat(None)), strict=False), start=1
+        )
+    )
+
+
+def number_things(
+    things: Sequence[Thing], earlier: Sequence[RememberedThing], *, n_named: int
+) -> tuple[tuple[RememberedThing, ...], int]:
+    """Return things under the ids that they had before, and new things under new ones.
+
+    Args:
+        n_named: How many ids were ever given; a thing that is gone leaves its id unused.
+
+    Returns:
+        The things in the order of their ids, and how many ids were ever given.
+    """
+    # By identity first: that is most of them, and to compare them as values is slow.
+    very_same = {id(each.thing): each for each in earlier}
+    ids: dict[int, RememberedThing] = {
+        number: very_same.pop(id(thing))
+        for number, thing in enumerate(things)
+        if id(thing) in very_same
+    }
+    same = {each.thing: each for each in very_same.values()}
+    for number, thing in enumerate(things):
+        if number not in ids and thing in same:
+            ids[number] = replace(same.pop(thing), thing=thing)
+    new = [number for number in range(len(things)) if number not in ids]
+    gone = list(same.values())
+    seen_better = match_best_first(
+        ((rank, number), each.id, number)
+        for number in new
+        for each in gone
+        if (rank := _sameness(things[number], each.thing)) is not None
+    )
+    for number, thing_id in seen_better.items():
+        ids[number] = RememberedThing(id=thing_id, thing=things[number])
+    for number in new:
+        if number not in ids:
+            n_named += 1
+            ids[number] = RememberedThing(id=f"T{n_named}", thing=things[number])
+    return tuple(sorted(ids.values(), key=lambda each: int(each.id[1:]))), n_named
+
+
+def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:
+    """Rank how surely one thing is another that was known before; None for another thing."""
+    if not name_the_same(thing.label, before.label):
+        return None
+    n_shared = len(_views_of(thing) & _views_of(before))
+    if thing.position is None or before.position is None:
+        return (-n_shared, 0.0) if n_shared else None
+    away_m = thing.position.distance_to(before.position)
+    return (-n_shared, away_m) if n_shared or away_m <= SAME_THING_M else None
+
+
+def _views_of(thing: Thing) -> set[tuple[str, str]]:
+    return {(view.waypoint, view.landmark.label) for view in thing.supporting}
