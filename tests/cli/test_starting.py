@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
+from mapspeak.cli.serving.starting import RobotStart, open_session
 from mapspeak.cli.shared.options import GuardChoice
 from mapspeak.cli.shared.robots import RobotChoice
-from mapspeak.cli.serving.starting import RobotStart, open_session
 
 LONG_S = 90.0
 
