@@ -58,3 +58,11 @@ def test_it_is_announced_how_much_there_is_to_do_and_how_to_stop(tmp_path: Path)
     said = announce(options, plan_run(options, options.load_worlds()))
     assert said.startswith("7 trials in 1 world by scripted, 2 at a time: about 1 min")
     assert "Ctrl-C stops; the same command goes on." in said
+
+
+def test_each_trial_of_a_task_has_the_next_seed(tmp_path: Path) -> None:
+    options = RunOptions(
+        tasks=("smallest-room",), worlds=("flat_1",), n_trials=3, seed=40, folder=tmp_path
+    )
+    trials = plan_run(options, options.load_worlds()).trials
+    assert sorted({(trial.number, trial.seed) for trial in trials}) == [(1, 40), (2, 41), (3, 42)]

@@ -57,3 +57,36 @@ def test_corners_into_which_the_robot_only_just_fits_stay_in_its_reach() -> None
 def test_where_the_robot_drives_it_can_stand(gap_m: float) -> None:
     site = two_rooms(gap_m=gap_m)
     assert not (site.drivable & ~site.floor.standable).any()
+
+
+def test_robots_begin_in_many_places_with_all_headings() -> None:
+    site, random = two_rooms(gap_m=0.7), np.random.default_rng(1)
+    poses = [site.draw_pose(random) for _ in range(60)]
+    quarters = {int(pose.yaw_rad // (np.pi / 2)) for pose in poses}
+    assert quarters == {-2, -1, 0, 1}
+    assert len({(pose.x, pose.y) for pose in poses}) > 40
+
+
+def test_a_place_is_seen_from_its_own_room_and_not_through_a_wall() -> None:
+    site = two_rooms(gap_m=0.6)
+    for y in (-1.0, 1.0):
+        seen = site.seen_near(Point(3.0, y), 2.0)
+        rows, cols = np.nonzero(seen)
+        places = site.grid.points_at(rows, cols)
+        assert len(places) > 20
+        assert (np.hypot(places[:, 0] - 3.0, places[:, 1] - y) <= 2.0).all()
+        assert (places[:, 0] < 4.0).all()
+
+
+def test_what_hangs_on_a_wall_is_seen_from_before_it_though_the_wall_is_solid() -> None:
+    site = two_rooms(gap_m=0.6)
+    rows, cols = np.nonzero(site.seen_near(Point(3.98, 1.2), 2.0))
+    places = site.grid.points_at(rows, cols)
+    assert (places[:, 0] < 4.0).sum() > 20
+
+
+def test_ways_are_as_long_as_the_floor_makes_them() -> None:
+    site = two_rooms(gap_m=0.7)
+    goal = site.near(Point(7.0, 0.0), 0.1)
+    assert site.shortest_to_any_m(Point(1.0, 0.0), goal) == pytest.approx(6.0, abs=0.2)
+    assert site.shortest_to_any_m(Point(1.0, 0.0), np.zeros_like(goal)) == np.inf
