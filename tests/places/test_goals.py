@@ -138,6 +138,24 @@ def test_there_is_no_nearest_pose_where_the_robot_cannot_move_at_all() -> None:
     assert check_goal(grid, distances, Pose(1.5, 1.5)).nearest is None
 
 
+def test_a_goal_inside_a_block_gets_the_place_nearest_to_it_wherever_the_map_begins() -> None:
+    text = """
+        #########
+        #.......#
+        #..###..#
+        #..###..#
+        #..###..#
+        #.......#
+        #########
+        """
+    for origin in (Pose(0.0, 0.0), Pose(30.0, 40.0), Pose(-30.0, -40.0)):
+        goal = origin @ Pose(2.25, 2.3)
+        found = check(goal, text=text, origin=origin)
+        assert found.verdict is GoalVerdict.OCCUPIED
+        assert found.nearest is not None
+        assert goal.y < found.nearest.y < goal.y + 1.0
+
+
 def test_the_same_is_said_on_a_map_with_a_turned_origin() -> None:
     origin = Pose(3.0, -2.0, 2.5)
     plain = check(Pose(0.25, 2.75))

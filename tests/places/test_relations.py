@@ -390,6 +390,32 @@ def test_left_and_right_are_mirror_images(x: float, y: float, yaw_rad: float) ->
     assert off_m == pytest.approx(0.0, abs=0.26)
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "0.8 m from W1",
+        "next to W1",
+        "the south-east corner of {west}",
+        "along the north wall of {west}",
+        "along the east wall of {east}",
+        "the middle of {east}",
+        "in front of {east}",
+        "between {west} and W1",
+    ],
+)
+def test_a_map_whose_origin_lies_elsewhere_has_its_places_there(words: str) -> None:
+    found = []
+    for shift in (Pose(0.0, 0.0), Pose(-40.0, 25.0)):
+        desk = Waypoint(name="Desk", pose=shift @ DESK.pose)
+        world = _world(desk, robot=shift @ ROBOT, turn=shift)
+        west, east = (_room_id(world, shift.transform(each)) for each in (WEST, EAST))
+        _, pose = _go(world, words.format(west=west, east=east))
+        found.append(shift.inverse() @ pose)
+    here, there = found
+    assert (there.x, there.y) == pytest.approx((here.x, here.y), abs=0.01)
+    assert wrap_angle(there.yaw_rad - here.yaw_rad) == pytest.approx(0.0, abs=0.01)
+
+
 @settings(max_examples=20)
 @given(turn_rad=st.floats(-math.pi, math.pi))
 def test_turning_the_map_turns_left_but_not_north(turn_rad: float) -> None:
