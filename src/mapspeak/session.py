@@ -395,6 +395,6 @@ class Session:
 
 
 def _prepare(world: WorldModel) -> None:
-    """Make what the first question would: things, their index, what speaks against them."""
+    """Make what the first question would: things, their index, rooms and ways."""
     world.recollection.prepare()
     _ = world.judge

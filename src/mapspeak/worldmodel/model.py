@@ -12,7 +12,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.memory.consistency.checking import check_memory
+from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.things.approach import (
     find_approach,
     find_fronts,
@@ -262,8 +262,8 @@ class WorldModel:
     def _judge(self) -> Judge:
         # What is closed for now says nothing against a record of what lies behind it.
         distances = self.map.open.distances_from(self.robot.point)
-        found = self.recollection.found
-        return Judge(check_memory(self.memory, found, distances=distances, rooms=self.rooms))
+        unseen = self.recollection.unseen
+        return Judge(MemoryCheck(self.memory, unseen, distances=distances, rooms=self.rooms))
 
     def find_approach(self, remembered: RememberedThing) -> Pose | None:
         """Find where the robot stands to face a thing from near; None where it cannot."""

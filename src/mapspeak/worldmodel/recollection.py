@@ -5,8 +5,7 @@ Making it is costly, so it is made when first asked for and kept until memory or
 
 import logging
 import threading
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from functools import cached_property
@@ -15,7 +14,9 @@ from weakref import WeakKeyDictionary
 
 from mapspeak.errors import ConfigError
 from mapspeak.memory import SemanticMap, Waypoint
+from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
+from mapspeak.memory.consistency.unseen import UnseenThings
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
@@ -76,6 +77,7 @@ class Recollection:
         places: The records under their ids.
         things: The things of these under their ids, in the order of these.
         n_named: How many ids were ever given.
+        unseen: What looks say of the things that they do not name.
         search: Answers questions.
     """
 
@@ -87,6 +89,7 @@ class Recollection:
         places: Sequence[RememberedPlace],
         things: Sequence[RememberedThing],
         n_named: int,
+        unseen: UnseenThings,
         search: Search,
     ) -> None:
         self.memory = memory
@@ -94,6 +97,7 @@ class Recollection:
         self.places = tuple(places)
         self.things = tuple(things)
         self.n_named = n_named
+        self.unseen = unseen
         self._search = search
 
     def is_of(self, memory: SemanticMap, grid: OccupancyGrid) -> bool:
@@ -149,32 +153,29 @@ class Recollection:
 
 
 class Judge:
-    """All findings of a memory, and how far each remembered place and thing may be trusted."""
+    """Says how far each remembered place and thing may be trusted.
 
-    def __init__(self, findings: Iterable[MemoryFinding]) -> None:
-        self.findings = tuple(findings)
-        # By identity: findings hold the very things, and comparing those as values is slow.
-        self._of_thing: dict[int, list[int]] = defaultdict(list)
-        self._of_waypoint: dict[str, list[int]] = defaultdict(list)
-        for number, finding in enumerate(self.findings):
-            for thing in finding.things:
-                self._of_thing[id(thing)].append(number)
-            for name in () if finding.things else finding.waypoints:
-                self._of_waypoint[name].append(number)
+    Args:
+        check: Finds what speaks against them.
+    """
+
+    def __init__(self, check: MemoryCheck) -> None:
+        self._check = check
+
+    @property
+    def findings(self) -> tuple[MemoryFinding, ...]:
+        """All that is odd about the memory."""
+        return self._check.findings
 
     def judge_thing(self, remembered: RememberedThing, *, now: datetime | None) -> Trust:
         """Return the trust that a thing deserves at a moment; without one its age is no matter."""
         thing = remembered.thing
-        numbers = set(self._of_thing.get(id(thing), ()))
-        for name in thing.waypoints:
-            numbers.update(self._of_waypoint.get(name, ()))
-        return judge_trust(thing, [self.findings[each] for each in sorted(numbers)], now=now)
+        return judge_trust(thing, self._check.find_of_thing(thing), now=now)
 
     def judge_place(self, place: RememberedPlace) -> Trust:
         """Return the trust that a record deserves: it is sure until something speaks against it."""
         ratio, against = 1.0, []
-        for number in self._of_waypoint.get(place.waypoint.name, ()):
-            finding = self.findings[number]
+        for finding in self._check.find_of_place(place.waypoint):
             if finding.label is None and finding.weight < 1.0:
                 ratio *= finding.weight
                 against.append(finding)
@@ -285,6 +286,7 @@ class Recollector:
             places=number_places(memory.waypoints, () if earlier is None else earlier.places),
             things=things,
             n_named=n_named,
+            unseen=UnseenThings(memory, found, earlier=None if earlier is None else earlier.unseen),
             search=self._search,
         )
 

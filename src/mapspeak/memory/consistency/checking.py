@@ -3,20 +3,20 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import groupby, pairwise
+from functools import cached_property
+from itertools import chain, groupby, pairwise
 
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
-from mapspeak.memory.consistency.unseen import check_unseen
+from mapspeak.memory.consistency.unseen import UnseenThings
 from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.sight import BODY_M, OWN_M
 from mapspeak.memory.things.thing import NOISE, Thing
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
-from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Region, RoomMap
 
@@ -129,36 +129,6 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
                 )
 
 
-def check_things(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
-    """Return things that some records contradict."""
-    placed = [thing for thing in found.things if thing.position is not None]
-    at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
-    yield from _two_labels(placed, at)
-    for thing in placed:
-        for view in thing.conflicting:
-            yield MemoryFinding(
-                kind=FindingKind.POINTS_PAST,
-                waypoints=(view.waypoint,),
-                label=view.landmark.label,
-                things=(thing,),
-                view=view,
-            )
-    yield from check_unseen(places, found, placed, at)
-
-
-def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFinding]:
-    for i, thing in enumerate(placed):
-        for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= ONE_PLACE_M).tolist():
-            other = placed[j]
-            is_seen_beside = set(thing.waypoints) & set(other.waypoints)
-            if not is_seen_beside and not name_the_same(thing.label, other.label):
-                yield MemoryFinding(
-                    kind=FindingKind.TWO_LABELS,
-                    waypoints=(*other.waypoints, *thing.waypoints),
-                    things=(other, thing),
-                )
-
-
 def _labels(waypoint: Waypoint) -> list[str]:
     return sorted(each.label.casefold() for each in waypoint.landmarks)
 
@@ -196,8 +166,9 @@ def find_misfiled(
 
 def _file(rooms: RoomMap, waypoint: Waypoint) -> tuple[Region, Region] | None:
     """Return the room that a record names and the room that it stands in; None if unknown."""
-    told = rooms.find_region(waypoint.room_id) if waypoint.room_id else None
-    point = waypoint.pose.point
+    if not waypoint.room_id:
+        return None
+    told, point = rooms.find_region(waypoint.room_id), waypoint.pose.point
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
     here = rooms.find_region_at(point) if is_near else None
     return None if told is None or here is None else (told, here)
@@ -229,13 +200,14 @@ _STEP_M = 0.2
 
 def check_rooms(
     rooms: RoomMap,
-    found: Things,
     waypoint: Waypoint,
+    seen: Iterable[Thing],
     misfiled: Mapping[str, tuple[Region, Region]],
 ) -> Iterator[MemoryFinding]:
     """Return findings about the room that a record names; none for a record without a room.
 
     Args:
+        seen: The things with a position that were seen from it.
         misfiled: By name of each misfiled record, the room that it names and its own.
     """
     if not waypoint.room_id:
@@ -249,7 +221,7 @@ def check_rooms(
         )
         return
     start = rooms.find_region_at(waypoint.pose.point) or rooms.find_region(waypoint.room_id)
-    for thing in found.seen_from(waypoint) if start is not None else ():
+    for thing in seen if start is not None else ():
         way = _regions_on(rooms, waypoint, thing, back_m=thing.uncertainty_m or 0.0)
         if start is not None and not _sees_through(rooms, waypoint, thing, (start, *way)):
             own = _regions_on(rooms, waypoint, thing, back_m=0.0)[-1]
@@ -303,6 +275,118 @@ def _off_line(start: Point, end: Point, point: Point) -> float:
     return foot.distance_to(point)
 
 
+class MemoryCheck:
+    """What speaks against what is remembered: worked out for what is asked for, and kept.
+
+    Args:
+        distances: From the robot, to check that places can be reached; None skips that check.
+    """
+
+    def __init__(
+        self,
+        places: SemanticMap,
+        unseen: UnseenThings,
+        *,
+        distances: DistanceField | None = None,
+        rooms: RoomMap | None = None,
+    ) -> None:
+        self._places = places
+        self._unseen = unseen
+        self._distances = distances
+        self._rooms = rooms
+        # By identity: to compare things as values is slow.
+        self._against: dict[int, list[MemoryFinding]] = {}
+
+    @cached_property
+    def findings(self) -> tuple[MemoryFinding, ...]:
+        """All findings, in the order of the places; deterministic."""
+        waypoints, placed = self._places.waypoints, self._unseen.placed
+        of_things = (
+            *chain.from_iterable(self._two_labels(i, n_others=i) for i in range(len(placed))),
+            *chain.from_iterable(map(_points_past, placed)),
+            *self._unseen.find_all(),
+        )
+        self._against = {id(thing): [] for thing in placed}
+        for finding in of_things:
+            for thing in finding.things:
+                self._against[id(thing)].append(finding)
+        of_places = chain.from_iterable(map(self._check_place, waypoints))
+        return (*of_places, *check_duplicates(waypoints), *of_things)
+
+    def find_of_place(self, waypoint: Waypoint) -> tuple[MemoryFinding, ...]:
+        """Return what speaks against a record itself, in the order of all findings."""
+        return tuple(each for each in self._check_place(waypoint) if not each.things)
+
+    def find_of_thing(self, thing: Thing) -> tuple[MemoryFinding, ...]:
+        """Return what speaks against a thing and its records, in the order of all findings."""
+        seen_from = sorted(self._numbers[name] for name in thing.waypoints)
+        of_places = (
+            finding
+            for number in seen_from
+            for finding in self._check_place(self._places.waypoints[number])
+            if not finding.things or any(each is thing for each in finding.things)
+        )
+        return (*of_places, *self._find_against(thing))
+
+    def _find_against(self, thing: Thing) -> Sequence[MemoryFinding]:
+        number = self._unseen.number_of(thing)
+        if number is None:
+            return ()
+        if id(thing) not in self._against:
+            self._against[id(thing)] = [
+                *self._two_labels(number, n_others=len(self._unseen.placed)),
+                *_points_past(thing),
+                *self._unseen.find(thing),
+            ]
+        return self._against[id(thing)]
+
+    def _check_place(self, waypoint: Waypoint) -> Iterator[MemoryFinding]:
+        found = self._unseen.found
+        of_pose = list(check_pose(found.sight.grid, waypoint, self._distances, self._places.map_id))
+        yield from of_pose
+        if of_pose and of_pose[-1].kind is FindingKind.OFF_MAP:
+            return
+        yield from check_rays(found, waypoint)
+        if self._rooms is not None:
+            filing, seen = _file(self._rooms, waypoint), self._unseen.seen_from(waypoint.name)
+            # All records are compared only where this one may be misfiled.
+            misfiled = self._misfiled if filing and filing[0].id != filing[1].id else {}
+            yield from check_rooms(self._rooms, waypoint, seen, misfiled)
+
+    def _two_labels(self, number: int, *, n_others: int) -> Iterator[MemoryFinding]:
+        """Return which of the first things are in the place of one and called otherwise."""
+        placed, at = self._unseen.placed, self._unseen.at
+        off_m = np.hypot(*(at[:n_others] - at[number]).T)
+        for other in np.flatnonzero(off_m <= ONE_PLACE_M).tolist():
+            one, two = placed[min(other, number)], placed[max(other, number)]
+            is_seen_beside = set(one.waypoints) & set(two.waypoints)
+            if not is_seen_beside and not name_the_same(two.label, one.label):
+                yield MemoryFinding(
+                    kind=FindingKind.TWO_LABELS,
+                    waypoints=(*one.waypoints, *two.waypoints),
+                    things=(one, two),
+                )
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {each.name: number for number, each in enumerate(self._places.waypoints)}
+
+    @cached_property
+    def _misfiled(self) -> Mapping[str, tuple[Region, Region]]:
+        return find_misfiled(self._rooms, self._places.waypoints) if self._rooms else {}
+
+
+def _points_past(thing: Thing) -> Iterator[MemoryFinding]:
+    for view in thing.conflicting:
+        yield MemoryFinding(
+            kind=FindingKind.POINTS_PAST,
+            waypoints=(view.waypoint,),
+            label=view.landmark.label,
+            things=(thing,),
+            view=view,
+        )
+
+
 def check_memory(
     places: SemanticMap,
     found: Things,
@@ -310,17 +394,6 @@ def check_memory(
     distances: DistanceField | None = None,
     rooms: RoomMap | None = None,
 ) -> tuple[MemoryFinding, ...]:
-    """Return all findings about a memory, in the order of its places; deterministic.
-
-    Args:
-        distances: From the robot, to check that places can be reached; None skips that check.
-    """
-    findings: list[MemoryFinding] = []
-    misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}
-    for waypoint in places.waypoints:
-        findings += check_pose(found.sight.grid, waypoint, distances, places.map_id)
-        if findings and findings[-1].kind is FindingKind.OFF_MAP:
-            continue
-        findings += check_rays(found, waypoint)
-        findings += check_rooms(rooms, found, waypoint, misfiled) if rooms else []
-    return (*findings, *check_duplicates(places.waypoints), *check_things(places, found))
+    """Return all findings about a memory, as `MemoryCheck` has them."""
+    unseen = UnseenThings(places, found)
+    return MemoryCheck(places, unseen, distances=distances, rooms=rooms).findings

@@ -1,8 +1,10 @@
 """Looks that should have shown a thing and did not, and things that stand elsewhere since."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from datetime import datetime
+from functools import cached_property
+from itertools import chain, islice
 
 import numpy as np
 
@@ -21,90 +23,219 @@ MOVED_RATIO = 0.5
 """A thing that later looks leave less likely may be the one of its name that is seen elsewhere."""
 
 
-def check_unseen(
-    places: SemanticMap, found: Things, placed: Sequence[Thing], at: FloatArray
-) -> Iterator[MemoryFinding]:
-    """Return things that looks should have shown, and those that may have been moved.
+class UnseenThings:
+    """Finds things that looks should have shown, and those that may have been moved.
+
+    Each thing is looked into once, when it is first asked for.
 
     Args:
-        placed: The things with a position.
+        earlier: Those of before: what depends on no changed look or thing is taken from them. The
+            answer is the same without.
+
+    Attributes:
+        found: All things.
+        placed: Those with a position, in the order of all.
         at: Where these are, shape (n, 2), metres.
+        looks: The waypoints by name.
+        known: What looks say against each thing that was looked into, by its identity.
     """
-    by_name = {each.name: each for each in places.waypoints}
-    owners = {
-        (view.waypoint, view.landmark): thing for thing in placed for view in thing.supporting
-    }
-    unseen = [finding for thing in placed for finding in _missed(thing, by_name)]
-    for waypoint in places.waypoints:
-        unseen += _not_shown(found, waypoint, placed, at, owners)
-    yield from unseen
-    yield from _moved(placed, unseen)
 
+    def __init__(
+        self, places: SemanticMap, found: Things, *, earlier: "UnseenThings | None" = None
+    ) -> None:
+        self._waypoints = places.waypoints
+        self.looks = {each.name: each for each in places.waypoints}
+        self.found = found
+        self.placed = [thing for thing in found.things if thing.position is not None]
+        at = [(thing.position.x, thing.position.y) for thing in self.placed if thing.position]
+        self.at = np.array(at, dtype=np.float64).reshape(-1, 2)
+        self._number = {id(thing): number for number, thing in enumerate(self.placed)}
+        self.known: dict[int, tuple[MemoryFinding, ...]] = {}
+        if earlier is not None and earlier.known:
+            self._take_over(earlier)
 
-def _missed(thing: Thing, by_name: Mapping[str, Waypoint]) -> Iterator[MemoryFinding]:
-    """Return the places it was once seen from, whose later looks did not name it."""
-    for view in thing.supporting:
-        look = by_name.get(view.waypoint)
-        if look is not None and view.landmark.n_missed and _is_later(look, thing.last_seen):
+    def _take_over(self, earlier: "UnseenThings") -> None:
+        changed = [each for each in earlier.placed if self.number_of(each) is None]
+        changed += (each for each in self.placed if earlier.number_of(each) is None)
+        names = {name for thing in changed for name in thing.waypoints}
+        looks, before = self.looks, earlier.looks
+        names.update(
+            name
+            for name in looks.keys() | before.keys()
+            if (now := looks.get(name)) is not (then := before.get(name)) and now != then
+        )
+        is_stale = np.zeros(len(self.placed), dtype=np.bool_)
+        for look in filter(None, (each.get(name) for each in (looks, before) for name in names)):
+            is_stale |= np.hypot(*(self.at - (look.pose.x, look.pose.y)).T) <= NEAR_M
+        for known, findings in earlier.known.items():
+            number = self._number.get(known)
+            if number is not None and not is_stale[number]:
+                self.known[known] = findings
+
+    def number_of(self, thing: Thing) -> int | None:
+        """Return the number of this very thing among the placed ones; None if it is none."""
+        return self._number.get(id(thing))
+
+    def seen_from(self, name: str) -> list[Thing]:
+        """Return the placed things that were seen from the waypoint of a name."""
+        return self._seen_from.get(name, [])
+
+    def find_all(self) -> Iterator[MemoryFinding]:
+        """Return the findings about all things: for each look in turn, then what was moved."""
+        of_look: defaultdict[int, list[MemoryFinding]] = defaultdict(list)
+        missed = [list(self._missed(thing)) for thing in self.placed]
+        looks = [finding for look in self._waypoints for finding in self._not_shown(look)]
+        for finding in looks:
+            of_look[id(finding.things[0])].append(finding)
+        for thing, own in zip(self.placed, missed, strict=True):
+            self.known[id(thing)] = (*own, *of_look[id(thing)])
+        yield from chain(*missed, looks)
+        for alike in self._alike.values():
+            for old in alike:
+                if self._is_gone(old):
+                    yield from self._moved(old)
+
+    def find(self, thing: Thing) -> Iterator[MemoryFinding]:
+        """Return the findings about one placed thing, in the order that they have among all."""
+        yield from self._unseen(thing)
+        yield from self._moved(thing)
+
+    @cached_property
+    def _looks_at(self) -> FloatArray:
+        return np.array([(each.pose.x, each.pose.y) for each in self._waypoints]).reshape(-1, 2)
+
+    @cached_property
+    def _seen_from(self) -> dict[str, list[Thing]]:
+        seen_from: defaultdict[str, list[Thing]] = defaultdict(list)
+        for thing in self.placed:
+            for view in thing.supporting:
+                of_look = seen_from[view.waypoint]
+                if not of_look or of_look[-1] is not thing:
+                    of_look.append(thing)
+        return seen_from
+
+    @cached_property
+    def _alike(self) -> dict[frozenset[str], list[Thing]]:
+        """The things by groups of labels, so that two that may be one are in the same."""
+        by_label: defaultdict[str, list[Thing]] = defaultdict(list)
+        for thing in self.placed:
+            by_label[thing.label].append(thing)
+        groups = group_names(list(by_label))
+        return {
+            group: [thing for label in sorted(group) for thing in by_label[label]]
+            for group in groups
+        }
+
+    @cached_property
+    def _group_of(self) -> dict[str, frozenset[str]]:
+        return {label: group for group in self._alike for label in group}
+
+    def _unseen(self, thing: Thing) -> tuple[MemoryFinding, ...]:
+        if id(thing) not in self.known:
+            number = self._number[id(thing)]
+            off_m = np.hypot(*(self._looks_at - self.at[number]).T)
+            looks = [self._waypoints[i] for i in np.flatnonzero(off_m <= NEAR_M).tolist()]
+            shown = (finding for look in looks for finding in self._not_shown(look, [number]))
+            self.known[id(thing)] = (*self._missed(thing), *shown)
+        return self.known[id(thing)]
+
+    def _missed(self, thing: Thing) -> Iterator[MemoryFinding]:
+        """Return the places it was once seen from, whose later looks did not name it."""
+        for view in thing.supporting:
+            if not view.landmark.n_missed:
+                continue
+            look = self.looks.get(view.waypoint)
+            if look is not None and _is_later(look, thing.last_seen):
+                yield MemoryFinding(
+                    kind=FindingKind.NOT_SEEN,
+                    waypoints=(view.waypoint,),
+                    things=(thing,),
+                    far_m=view.far_m,
+                    n_since=view.landmark.n_missed,
+                )
+
+    def _not_shown(
+        self, waypoint: Waypoint, among: Sequence[int] | None = None
+    ) -> Iterator[MemoryFinding]:
+        """Return unnamed things that a waypoint shows within the cone of what it names.
+
+        Args:
+            among: The numbers of things that are near it; all that are where None.
+        """
+        cone = find_cone(waypoint)
+        if cone is None:
+            return
+        pose = waypoint.pose
+        if among is None:
+            off_m = np.hypot(*(self.at - (pose.x, pose.y)).T)
+            among = np.flatnonzero(off_m <= NEAR_M).tolist()
+        shown = _measure_shown(self.found, waypoint, [self.placed[i] for i in among], cone)
+        for i, shown_ratio in zip(among, shown.tolist(), strict=True):
+            if shown_ratio < LEAST_SHOWN_RATIO:
+                continue
+            thing, point = self.placed[i], Point(*self.at[i].tolist())
+            bearing_rad = wrap_angle(pose.point.bearing_to(point) - pose.yaw_rad)
+            if self._is_told(thing, waypoint, bearing_rad):
+                continue
             yield MemoryFinding(
                 kind=FindingKind.NOT_SEEN,
-                waypoints=(view.waypoint,),
+                waypoints=(waypoint.name,),
                 things=(thing,),
-                far_m=view.far_m,
-                n_since=view.landmark.n_missed,
+                far_m=pose.point.distance_to(point),
+                n_since=int(_is_later(waypoint, thing.last_seen)),
+                shown_ratio=shown_ratio,
             )
+
+    def _is_told(self, thing: Thing, waypoint: Waypoint, bearing_rad: float) -> bool:
+        """Return True when a waypoint names what may be a thing, or counts that it does not.
+
+        Args:
+            bearing_rad: From the waypoint's heading to the thing.
+        """
+        owners = {
+            view.landmark: owner
+            for owner in self.seen_from(waypoint.name)
+            for view in owner.supporting
+            if view.waypoint == waypoint.name
+        }
+        named = find_named(waypoint)
+        return any(_may_be(thing, each, bearing_rad, owners.get(each)) for each in named) or any(
+            view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting
+        )
+
+    def _is_gone(self, thing: Thing) -> bool:
+        against = self._unseen(thing)
+        return (
+            any(each.n_since for each in against)
+            and judge_trust(thing, against).ratio < MOVED_RATIO
+        )
+
+    def _moved(self, thing: Thing) -> Iterator[MemoryFinding]:
+        """Return a thing that is gone and the only one of its name that is new since."""
+        others = self._find_partners(thing)
+        if len(others) == 1 and len(self._find_partners(others[0])) == 1:
+            old, new = (thing, *others) if self._is_gone(thing) else (*others, thing)
+            yield MemoryFinding(
+                kind=FindingKind.MOVED, waypoints=new.waypoints[:1], things=(old, new)
+            )
+
+    def _find_partners(self, thing: Thing) -> list[Thing]:
+        """Return those that it may have been moved from or to: two at most, for that is enough."""
+        is_gone = self._is_gone(thing)
+        partners = (
+            other
+            for other in self._alike[self._group_of[thing.label]]
+            if (_is_newer(other, thing) if is_gone else _is_newer(thing, other))
+            and name_the_same(thing.label, other.label)
+            and self._is_gone(other) is not is_gone
+        )
+        return list(islice(partners, 2))
 
 
 def _is_later(look: Waypoint, last_seen: datetime | None) -> bool:
     if look.recorded_at is None or last_seen is None:
         return False
     return look.recorded_at > last_seen
-
-
-def _not_shown(
-    found: Things,
-    waypoint: Waypoint,
-    placed: Sequence[Thing],
-    at: FloatArray,
-    owners: Mapping[tuple[str, Landmark], Thing],
-) -> Iterator[MemoryFinding]:
-    """Return unnamed things that a waypoint shows within the cone of what it names."""
-    cone = find_cone(waypoint)
-    if cone is None:
-        return
-    pose, named = waypoint.pose, find_named(waypoint)
-    near = np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist()
-    shown = _measure_shown(found, waypoint, [placed[i] for i in near], cone)
-    for i, shown_ratio in zip(near, shown.tolist(), strict=True):
-        thing, point = placed[i], Point(*at[i].tolist())
-        bearing_rad = wrap_angle(pose.point.bearing_to(point) - pose.yaw_rad)
-        if shown_ratio < LEAST_SHOWN_RATIO or _is_told(thing, waypoint, named, bearing_rad, owners):
-            continue
-        yield MemoryFinding(
-            kind=FindingKind.NOT_SEEN,
-            waypoints=(waypoint.name,),
-            things=(thing,),
-            far_m=pose.point.distance_to(point),
-            n_since=int(_is_later(waypoint, thing.last_seen)),
-            shown_ratio=shown_ratio,
-        )
-
-
-def _is_told(
-    thing: Thing,
-    waypoint: Waypoint,
-    named: Sequence[Landmark],
-    bearing_rad: float,
-    owners: Mapping[tuple[str, Landmark], Thing],
-) -> bool:
-    """Return True when a waypoint names what may be a thing, or itself counts that it does not.
-
-    Args:
-        bearing_rad: From the waypoint's heading to the thing.
-    """
-    return any(
-        _may_be(thing, each, bearing_rad, owners.get((waypoint.name, each))) for each in named
-    ) or any(view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting)
 
 
 def _may_be(thing: Thing, landmark: Landmark, bearing_rad: float, owner: Thing | None) -> bool:
@@ -133,43 +264,6 @@ def _measure_shown(
         np.repeat(np.arange(len(spots)), n_spots), weights=in_sight, minlength=len(spots)
     )
     return sums / np.maximum(n_spots, 1)
-
-
-def _moved(placed: Sequence[Thing], unseen: Sequence[MemoryFinding]) -> Iterator[MemoryFinding]:
-    """Return pairs of a thing that is gone and the only one of its name that is new since."""
-    against: defaultdict[int, list[MemoryFinding]] = defaultdict(list)
-    for finding in unseen:
-        for thing in finding.things:
-            against[id(thing)].append(finding)
-    gone = {
-        id(thing)
-        for thing in placed
-        if any(each.n_since for each in against[id(thing)])
-        and judge_trust(thing, against[id(thing)]).ratio < MOVED_RATIO
-    }
-    pairs = [
-        (old, new)
-        for alike in _group_by_name(placed)
-        for old in alike
-        for new in alike
-        if id(old) in gone and id(new) not in gone and _is_newer(new, old)
-        if name_the_same(old.label, new.label)
-    ]
-    n_pairs = Counter(id(thing) for pair in pairs for thing in pair)
-    for old, new in pairs:
-        if n_pairs[id(old)] == n_pairs[id(new)] == 1:
-            yield MemoryFinding(
-                kind=FindingKind.MOVED, waypoints=new.waypoints[:1], things=(old, new)
-            )
-
-
-def _group_by_name(things: Sequence[Thing]) -> Iterator[list[Thing]]:
-    """Return things in groups, so that two that may be one are in the same."""
-    by_label: defaultdict[str, list[Thing]] = defaultdict(list)
-    for thing in things:
-        by_label[thing.label].append(thing)
-    for group in group_names(list(by_label)):
-        yield [thing for label in sorted(group) for thing in by_label[label]]
 
 
 def _is_newer(new: Thing, old: Thing) -> bool:

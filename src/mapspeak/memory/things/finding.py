@@ -94,14 +94,6 @@ class Things:
         is_near, is_far = (far_m <= each[rays] + SURFACE_M for each in (seen.near_m, seen.far_m))
         return np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
 
-    def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
-        """Return the things with a place that were seen from a waypoint."""
-        return tuple(
-            thing
-            for thing in self.things
-            if thing.position is not None and waypoint.name in thing.waypoints
-        )
-
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
         """Return how far one sees towards a point over what one may see over."""
         seen = self._surroundings(waypoint)

@@ -33,6 +33,7 @@ class _Parts:
     kinds: tuple[ThingKind, ...]
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def name_the_same(label: str, other: str) -> bool:
     """Return True when two labels may name one thing.
 

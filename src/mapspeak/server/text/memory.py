@@ -84,12 +84,12 @@ def describe_check(world: WorldModel, *, first: int) -> str:
         first: The number of the row to begin with, of both lists.
     """
     judge = world.judge
+    findings = sorted(judge.findings, key=lambda finding: finding.weight)
     trusts = [(judge.judge_thing(each, now=world.now), each) for each in world.things]
     doubted = sorted(
         ((trust, each) for trust, each in trusts if trust.findings),
         key=lambda pair: (pair[0].ratio, int(pair[1].id[1:])),
     )
-    findings = sorted(judge.findings, key=lambda finding: finding.weight)
     n_once = sum(len(each.thing.supporting) == 1 for each in world.things)
     summary = (
         f"{say_count(len(world.places), 'place')} and {say_count(len(world.things), 'thing')} "
