@@ -142,7 +142,7 @@ async def test_a_remembered_thing_is_looked_at_from_where_the_robot_faces_it(
 ) -> None:
     robot = RoamingRobot(flat, has_detector=True)
     session = session_of(robot, tmp_path)
-    fridge = Landmark(label="blue fridge", bearing_rad=0.0, range_m=3.0)
+    fridge = Landmark(label="blue fridge", bearing_rad=0.0, range_m=5.0)
     session.memory.write(
         Waypoint(name="far end", pose=Pose(0.5, 0.0, 0.0), functional_landmarks=(fridge,))
     )

@@ -15,7 +15,7 @@ import numpy as np
 
 from mapspeak.memory.merging import SAME_SPOT_M
 from mapspeak.memory.things.labels import name_the_same
-from mapspeak.memory.things.likelihood import WeighedView, are_apart
+from mapspeak.memory.things.likelihood import NEAR_M, WeighedView, are_apart
 from mapspeak.memory.things.placing import (
     Posterior,
     build_posterior,
@@ -30,7 +30,6 @@ from mapspeak.spatial.grid import FloatArray, IntArray
 Group = list[WeighedView]
 
 N_SWEEPS = 2
-_NEAR_M = 2.0
 _THINGS_PER_CELL = 0.01
 """Of one name: about one on twenty metres of wall, in cells of the lattice."""
 
@@ -237,7 +236,7 @@ def _merge(posteriors: Posteriors, groups: list[Group]) -> list[Group]:
     middles = [find_middle(sight, posteriors.of(group)) for group in groups]
     at = np.array(middles).reshape(-1, 2)
     off_m = np.hypot(*(np.subtract.outer(at[:, k], at[:, k]) for k in (0, 1)))
-    first, second = np.nonzero(np.tril(off_m <= _NEAR_M, k=-1))
+    first, second = np.nonzero(np.tril(off_m <= NEAR_M, k=-1))
     pairs = sorted(zip(off_m[first, second].tolist(), first.tolist(), second.tolist(), strict=True))
     owner = list(range(len(groups)))
     merged = dict(enumerate(groups))

@@ -28,6 +28,8 @@ One such pair in twenty splits a thing in two, which makes it ambiguous and so i
 things makes one in a wrong place that nothing tells. Hence no wider; narrower splits ever more.
 """
 
+NEAR_M = 2.0
+"""Things whose middles are no farther apart may be one."""
 LEAST_RATIO = 1.0
 """A view speaks of no place that it does not make likelier than it was."""
 HANGING_PER_CELL, STANDING_PER_CELL = 0.015, 0.004
@@ -192,6 +194,7 @@ class WeighedView:
         spot: Where its direction and range together say that it is; None without both.
         is_on_wall: Such things hang on walls.
         least_ratio: It speaks of places that it makes so much likelier.
+        spoken_of: The cells that it speaks of; where it contradicts the map, all that are near.
     """
 
     waypoint: Waypoint
@@ -203,13 +206,7 @@ class WeighedView:
     spot: RangedSpot | None
     is_on_wall: bool
     least_ratio: float
-
-    @property
-    def spoken_of(self) -> IntArray:
-        """The cells that it speaks of, rising; the thing may be in others if this view is wrong."""
-        if self.likelihood is None:
-            return np.empty(0, dtype=np.intp)
-        return self.likelihood.cells[self.likelihood.ratios >= self.least_ratio]
+    spoken_of: IntArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -264,6 +261,7 @@ def _read(
             if likelihood is not None and not likelihood.ratios.any():
                 likelihood = None
             is_on_wall = hangs_on_walls(landmark.label)
+            least_ratio = _least_ratio(sight, likelihood, on_wall=is_on_wall)
             sightings.append(
                 WeighedView(
                     waypoint=waypoint,
@@ -274,7 +272,8 @@ def _read(
                     likelihood=likelihood,
                     spot=find_spot(waypoint.pose, landmark),
                     is_on_wall=is_on_wall,
-                    least_ratio=_least_ratio(sight, likelihood, on_wall=is_on_wall),
+                    least_ratio=least_ratio,
+                    spoken_of=_find_spoken_of(sight, likelihood, least_ratio),
                 )
             )
     return Surroundings(
@@ -292,3 +291,20 @@ def _least_ratio(sight: SightMap, likelihood: ViewLikelihood | None, *, on_wall:
     log_priors = find_log_priors(sight, likelihood.cells, (likelihood.update,), on_wall=on_wall)
     per_cell = HANGING_PER_CELL if on_wall else STANDING_PER_CELL
     return max(LEAST_RATIO, per_cell * float(np.exp(log_priors) @ likelihood.ratios))
+
+
+def _find_spoken_of(
+    sight: SightMap, likelihood: ViewLikelihood | None, least_ratio: float
+) -> IntArray:
+    """Return the cells that a view speaks of, rising; its thing is elsewhere if it is wrong."""
+    if likelihood is None:
+        return np.empty(0, dtype=np.intp)
+    is_likely = likelihood.ratios >= least_ratio
+    if is_likely.any():
+        return likelihood.cells[is_likely]
+    # It contradicts the map, and may be an error about what is near.
+    rows, cols = sight.rows.ravel(), sight.cols.ravel()
+    weights = likelihood.ratios / likelihood.ratios.sum()
+    middle = weights @ rows[likelihood.cells], weights @ cols[likelihood.cells]
+    off = np.hypot(rows - middle[0], cols - middle[1])
+    return np.flatnonzero(off * sight.grid.resolution_m <= NEAR_M)
