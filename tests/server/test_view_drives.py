@@ -32,6 +32,23 @@ CORRIDOR = grid_from_text(
 )
 
 
+CELL_BEFORE_UNKNOWN = grid_from_text(
+    """
+    #########???????????
+    #.......#???????????
+    #.......#...????????
+    #.......#....???????
+    #............???????
+    #............???????
+    #.......#....???????
+    #.......#...????????
+    #.......#???????????
+    #########???????????
+    """,
+    resolution_m=0.25,
+)
+
+
 async def drive(client: Client, **arguments: str | float) -> dict[str, Any]:
     return report_of(await client.call_tool("navigate_to", arguments))
 
@@ -45,6 +62,14 @@ async def test_a_second_drive_to_a_place_faces_what_the_first_picture_left_out(
         second = await drive(client, place="C1")
     apart_deg = abs(second["robot"]["yaw_deg"] - first["robot"]["yaw_deg"]) % 360
     assert min(apart_deg, 360 - apart_deg) >= 60
+
+
+async def test_a_drive_to_a_room_faces_into_it_and_not_out_of_its_door(tmp_path: Path) -> None:
+    robot = FakeRobot(CELL_BEFORE_UNKNOWN, pose=Pose(1.0, 1.25, 0.0))
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("look_around", {})
+        arrived = await drive(client, place="R1")
+    assert abs(arrived["robot"]["yaw_deg"]) >= 60
 
 
 async def test_a_heading_that_is_asked_for_is_kept(tmp_path: Path) -> None:

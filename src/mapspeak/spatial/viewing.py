@@ -70,6 +70,12 @@ class Panorama:
     metres: FloatArray = field(repr=False)
     is_open: Mask = field(repr=False)
 
+    def ends_before(self, place: Point) -> FloatArray:
+        """Return a point just before the end of each ray from their place, shape (N_RAYS, 2)."""
+        far_m = np.maximum(self.metres - 1.5 * self.grid.resolution_m, 0.0)[:, None]
+        along = np.column_stack([np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)])
+        return np.asarray([place.x, place.y] + far_m * along, dtype=np.float64)
+
     def wall_m_by_heading(self, half_view_rad: float, *, but: Mask | None = None) -> FloatArray:
         """Return how much wall a picture in the direction of each ray would show, in metres.
 

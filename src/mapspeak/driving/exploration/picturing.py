@@ -5,13 +5,19 @@ from functools import partial
 from typing import Protocol
 
 from mapspeak.driving.drive import OnProgress
-from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.exploration.trips import TripContext, name_turn
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.memory import PictureBook
 from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
-from mapspeak.places.views.headings import aim_for_picture, face_new_walls, find_room_near
+from mapspeak.places.views.headings import (
+    Face,
+    aim_for_picture,
+    face_new_walls,
+    face_room,
+    find_room_near,
+)
 from mapspeak.robot import GoalState
 from mapspeak.safety import ApprovalScope
 
@@ -33,7 +39,7 @@ class PictureContext(TripContext, Protocol):
 
 async def aim(site: PictureContext, goal: CheckedGoal) -> CheckedGoal:
     """Choose the heading to arrive with, if none was asked for and a picture is wanted."""
-    if goal.purpose is not GoalPurpose.LOOK:
+    if not goal.purpose.is_for_picture:
         return goal
     world, views = await site.fetch_world_model(), site.pictures.views
     return await site.compute(partial(aim_for_picture, world, goal, views))
@@ -63,7 +69,7 @@ async def end_for_picture(
     drive, state = report.drive, report.status.state
     latest = site.drives.latest
     is_latest = latest is not None and latest.goal_id == drive.goal_id
-    if drive.purpose is not GoalPurpose.LOOK or not is_latest:
+    if not drive.purpose.is_for_picture or not is_latest:
         return report
     try:
         if state is GoalState.BLOCKED:
@@ -76,6 +82,10 @@ async def end_for_picture(
     return report
 
 
+def _choose_face(drive: Drive) -> Face:
+    return face_room if drive.purpose is GoalPurpose.LOOK_INSIDE else face_new_walls
+
+
 async def _drive_nearby(
     site: PictureContext, report: DriveReport, wait_s: float, on_progress: OnProgress
 ) -> DriveReport:
@@ -86,7 +96,7 @@ async def _drive_nearby(
     if point is None:
         return report
     pose = Pose(point.x, point.y, drive.goal.yaw_rad)
-    pose = await site.compute(partial(face_new_walls, world, pose, views))
+    pose = await site.compute(partial(_choose_face(drive), world, pose, views))
     nearby = await site.drives.start(
         pose, place=drive.place, ticket=drive.ticket, client=drive.client, purpose=drive.purpose
     )
@@ -98,7 +108,7 @@ async def _turn_to_new_walls(
 ) -> DriveReport:
     drive = report.drive
     world, views = await site.fetch_world_model(), site.pictures.views
-    pose = await site.compute(partial(face_new_walls, world, report.pose, views))
+    pose = await site.compute(partial(_choose_face(drive), world, report.pose, views))
     if pose == report.pose:
         return report
     turn = await site.drives.start(

@@ -67,9 +67,16 @@ class GoalPurpose(StrEnum):
 
     ARRIVE = "arrive"
     LOOK = "look"
-    """To see what is there: no heading was asked for."""
+    """To see what lies there and beyond: no heading was asked for."""
+    LOOK_INSIDE = "look_inside"
+    """To see a room: no heading was asked for."""
     CHECK = "check"
     """To see whether something remembered is there."""
+
+    @property
+    def is_for_picture(self) -> bool:
+        """True where the robot chooses the heading for the sake of a picture."""
+        return self in (GoalPurpose.LOOK, GoalPurpose.LOOK_INSIDE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +170,9 @@ def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None
 def _purpose_of(place: Place, yaw_deg: float | None) -> GoalPurpose:
     if isinstance(place.thing, RememberedThing):
         return GoalPurpose.CHECK
-    is_to_look = yaw_deg is None and isinstance(place.thing, Region | Frontier)
+    if yaw_deg is None and isinstance(place.thing, Region):
+        return GoalPurpose.LOOK_INSIDE
+    is_to_look = yaw_deg is None and isinstance(place.thing, Frontier)
     return GoalPurpose.LOOK if is_to_look else GoalPurpose.ARRIVE
 
 

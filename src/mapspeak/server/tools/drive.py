@@ -277,7 +277,7 @@ class ViewTools:
 
 def _scope_of(place: str, purpose: GoalPurpose) -> AbstractContextManager[None]:
     """Let one word of a person do for a drive and the turn at its end."""
-    return within_scope(scope_of(place)) if purpose is GoalPurpose.LOOK else nullcontext()
+    return within_scope(scope_of(place)) if purpose.is_for_picture else nullcontext()
 
 
 def _say_no_view(report: DriveReport) -> str:
