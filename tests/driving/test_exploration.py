@@ -11,9 +11,11 @@ from mapspeak.driving.exploration.blocked import BlockedPlaces, TripEnd
 from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import BoundKind, Bounds, ExplorationState, Progress
 from mapspeak.errors import GoalError, PolicyError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.places.views.headings import face_new_walls
 from mapspeak.robot import GoalState
 from mapspeak.server.text.world.drives import say_progress
+from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.simulator import World
 from mapspeak.spatial.frontiers import RefusalReason
 from roaming import RoamingRobot, session_of, world_from_text
@@ -317,6 +319,21 @@ async def test_exploring_pauses_also_where_a_goal_has_been_seen_from_afar(tmp_pa
     assert all(each.trip is None for each in pauses)
     points = [each.pose.point for each in seen]
     assert all(a.distance_to(b) > 2.5 for a, b in itertools.pairwise(points))
+
+
+async def test_at_a_pause_the_robot_faces_what_no_picture_shows(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    session = session_of(robot, tmp_path)
+    explorer = Explorer(session)
+    progress = await _explore(explorer, Bounds(stops_at_goals=True))
+    turns_rad = []
+    while not progress.state.is_end:
+        world, pose = await session.fetch_world_model(), progress.pose
+        better = face_new_walls(world, pose, session.pictures.views)
+        turns_rad.append(abs(wrap_angle(better.yaw_rad - pose.yaw_rad)))
+        await look_ahead(session)
+        progress = await _explore(explorer, Bounds(stops_at_goals=True))
+    assert turns_rad == pytest.approx([0.0] * len(turns_rad), abs=0.1)
 
 
 def test_a_blocked_place_is_open_again_when_the_map_has_changed_there() -> None:

@@ -10,7 +10,7 @@ from mapspeak.driving.exploration.camera import (
     is_view_due,
     measure_pictured_on,
 )
-from mapspeak.driving.exploration.picturing import PictureContext
+from mapspeak.driving.exploration.picturing import PictureContext, turn_for_picture
 from mapspeak.driving.exploration.progress import (
     BoundKind,
     Bounds,
@@ -112,6 +112,8 @@ class Explorer:
                     return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
                 if (seen_id := self._find_seen_from_here(world)) is not None:
                     await self._trips.give_up(is_seen=True)
+                    await turn_for_picture(self._site, client=client, on_progress=on_trip)
+                    world = await self._site.fetch_world_model()
                     return await self._end(world, ExplorationState.AT_GOAL, seen_id=seen_id)
                 state = await self._choose(world, ticket, client)
             if state is None:
@@ -125,6 +127,8 @@ class Explorer:
             spent_s = self._site.robot.now_s - begun_s
             self._elapsed_s = before_s + spent_s
             ended = self._after(state, is_late=spent_s >= wait_s - SLACK_S)
+            if ended is ExplorationState.AT_GOAL:
+                await turn_for_picture(self._site, client=client, on_progress=on_trip)
             if ended is not None:
                 return await self._end(await self._site.fetch_world_model(), ended)
 

@@ -1,12 +1,13 @@
 """Drives that end where a picture is worth taking."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import Drive, DriveReport
-from mapspeak.driving.exploration.trips import TripContext, name_turn
+from mapspeak.driving.exploration.trips import TripContext, name_turn, turn_to
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.memory import PictureBook
@@ -49,6 +50,21 @@ def scope_of(place: str) -> ApprovalScope:
     """Return what a person agrees to at once: the drive to a place, and what ends it there."""
     what = f"drive to {place} and turn there to look"
     return ApprovalScope(what=what, n_drives=MOST_DRIVES, duration_s=SCOPE_S)
+
+
+async def turn_for_picture(site: PictureContext, *, client: str, on_progress: OnProgress) -> None:
+    """Turn the robot where it stands to what no picture shows.
+
+    It stays as it is without a camera, and where it was stopped or another client drives it.
+    """
+    if not site.robot.description.has_camera:
+        return
+    world, views = await site.fetch_world_model(), site.pictures.views
+    pose = await site.compute(partial(face_new_walls, world, world.robot, views))
+    if pose == world.robot:
+        return
+    with suppress(GoalError, PolicyError):
+        await turn_to(site, pose.yaw_rad, wait_s=TURN_S, on_progress=on_progress, client=client)
 
 
 async def end_for_picture(

@@ -127,7 +127,7 @@ class ExploreTools:
         )
         if bounds.for_camera:
             self._require_camera()
-        with within_scope(_exploring(n_goals, duration_s)):
+        with within_scope(_exploring(bounds)):
             progress = await self._explorer.advance(
                 bounds, wait_s=wait_s, on_trip=tell_progress(context), client=client_of(context)
             )
@@ -194,11 +194,14 @@ class ExploreTools:
         return await look_ahead(self._session) if robot.description.has_camera else None
 
 
-def _exploring(n_goals: int | None, duration_s: float | None) -> ApprovalScope:
+def _exploring(bounds: Bounds) -> ApprovalScope:
     """Return the command to approve; where the call has no bound, the approval has one."""
+    n_goals, duration_s = bounds.n_goals, bounds.duration_s
+    n_drives = USUAL_DRIVES if n_goals is None else n_goals
     return ApprovalScope(
         what="explore",
-        n_drives=USUAL_DRIVES if n_goals is None else n_goals,
+        # At a pause it turns for the picture.
+        n_drives=n_drives * (2 if bounds.stops_at_goals else 1),
         duration_s=USUAL_DURATION_S if duration_s is None else duration_s,
     )
 
