@@ -97,6 +97,24 @@ def test_a_line_that_leaves_the_seen_floor_is_told() -> None:
     assert kinds(place("a", 4.0, 2.4, mark("sink"), yaw_deg=0.0)) == [FindingKind.THROUGH_UNKNOWN]
 
 
+def test_what_is_seen_on_furniture_is_not_told_to_lie_in_the_unknown_inside_it() -> None:
+    hall = """
+        ####################
+        #..................#
+        #............#?????#
+        #............#?????#
+        #............#?????#
+        #............#?????#
+        #............#?????#
+        #............#?????#
+        #..................#
+        ####################
+    """
+    grid = grid_from_text(hall, resolution_m=0.1)
+    memory = SemanticMap(waypoints=(place("a", 0.5, 0.5, mark("coffee machine"), yaw_deg=0.0),))
+    assert check_memory(memory, find_things(memory, grid)) == ()
+
+
 def test_two_places_with_one_pose_and_content_are_twins() -> None:
     twin = place("b", 1.6, 1.5, mark("Sink"))
     findings = check(place("a", 1.5, 1.5, mark("sink")), twin)[1]

@@ -8,7 +8,7 @@ from itertools import chain, groupby, pairwise
 
 import numpy as np
 
-from mapspeak.geometry import Point, wrap_angle
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
 from mapspeak.memory.consistency.unseen import UnseenThings
 from mapspeak.memory.things.finding import Things
@@ -91,14 +91,19 @@ def _check(found: Things, stand: Waypoint, landmark: Landmark) -> tuple[FindingK
 
 
 def _open_m(found: Things, stand: Waypoint, way: float) -> float:
-    pose = stand.pose
-    return found.open_m(stand, Point(pose.x + math.cos(way), pose.y + math.sin(way)))
+    return found.open_m(stand, _along(stand.pose, way))
+
+
+def _along(pose: Pose, way: float) -> Point:
+    return Point(pose.x + math.cos(way), pose.y + math.sin(way))
 
 
 def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: float) -> bool:
     grid = found.sight.grid
     if open_m >= NOISE.reach_m:
         return False
+    if found.is_over_furniture(waypoint, _along(waypoint.pose, way)):
+        return False  # What is unknown there is the furniture itself, which may be the thing.
     pose = waypoint.pose
     end = grid.cell_at(Point(pose.x + open_m * math.cos(way), pose.y + open_m * math.sin(way)))
     if not grid.contains(end):

@@ -102,6 +102,17 @@ class Things:
     def _surroundings(self, stand: Waypoint) -> Surroundings:
         return next(each for each in self.seen[stand.name] if each.pose == stand.pose)
 
+    def is_over_furniture(self, waypoint: Waypoint, point: Point) -> bool:
+        """Return True when one sees towards a point over something that stands on the way."""
+        seen, ray = self.surroundings[waypoint], self._ray(waypoint.pose, point)
+        near_m, grid = float(seen.near_m[ray]), self.sight.grid
+        if near_m >= seen.far_m[ray]:
+            return False
+        here, met_m = waypoint.pose.point, near_m + grid.resolution_m / 2
+        way = Pose(here.x, here.y, here.bearing_to(point))
+        cell = grid.cell_at(way.transform(Point(met_m, 0.0)))
+        return grid.contains(cell) and bool(grid.occupied[cell.row, cell.col])
+
     def _ray(self, pose: Pose, point: Point) -> int:
         angle = pose.point.bearing_to(point) - self.sight.grid.origin.yaw_rad
         return round(angle * N_RAYS / math.tau) % N_RAYS
