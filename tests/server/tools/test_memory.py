@@ -164,6 +164,23 @@ async def test_many_observations_are_summed_up_before_they_are_listed(tmp_path: 
     assert "Nothing observed passes" in none
 
 
+async def test_what_was_seen_is_told_by_the_rooms_of_the_map_as_it_is_now(tmp_path: Path) -> None:
+    cells = two_rooms().cells.copy()
+    cells[1:-1, 13] = 0
+    robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.25))
+    guard = make_guard(tmp_path, clock=WallClock(MONDAY_NOON))
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        for x in (1.0, 5.0):
+            robot.pose = Pose(x, 1.0)
+            await client.call_tool("look_through_camera", {})
+        robot.grid = two_rooms()
+        told = text_of(await client.call_tool("recall_episodes", {}))
+        of_one = text_of(await client.call_tool("recall_episodes", {"room": "R2"}))
+    assert ", in R1 |" in told
+    assert ", in R2 |" in told
+    assert of_one.startswith("1 observation;")
+
+
 async def test_what_ends_in_the_morning_may_begin_in_the_evening(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, clock=WallClock(MONDAY_NOON))
     async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS, guard=guard) as client:

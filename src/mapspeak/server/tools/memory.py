@@ -1,6 +1,6 @@
 """The tools of the memory besides finding: its faults, what was observed, what is the matter."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from datetime import datetime
 from typing import Annotated
@@ -10,6 +10,8 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError, MapError, SemanticMapError
 from mapspeak.memory.episodes.observation import (
+    EpisodeFilter,
+    EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
     EpisodeQuery,
@@ -144,7 +146,8 @@ class MemoryTools:
             offset=from_row,
         )
         if near is None and near_seen is None and room is None and radius_m is None:
-            return [await self._session.compute(lambda: self._list(wanted, now))]
+            map_now = await self._find_map()
+            return [await self._session.compute(lambda: self._list(wanted, now, map_now))]
         world = await self._session.fetch_world_model()
 
         def ask() -> str:
@@ -154,17 +157,45 @@ class MemoryTools:
                 return self._recall_near_seen(world, near_seen, radius_m, query, now)
             point = None if near is None else find_point(world, near)
             query = replace(query, near=point, radius_m=radius_m)
-            return self._list(query, now)
+            return self._list(query, now, world)
 
         return [await self._session.compute(ask)]
 
-    def _list(self, query: EpisodeQuery, now: datetime | None) -> str:
+    async def _find_map(self) -> WorldModel | None:
+        try:
+            return await self._session.fetch_world_model()
+        except (LinkError, MapError):
+            return None
+
+    def _list(self, query: EpisodeQuery, now: datetime | None, world: WorldModel | None) -> str:
         """Return a page of observations; before the first of several all are summed up."""
-        page = self._session.find_episodes(query)
+        page = self._find(query, world)
         if query.offset or page.next_page is None:
             return describe_episodes(page, now=now)
-        whole = self._session.find_episodes(replace(query, limit=MOST_COMPARED))
+        whole = self._find(replace(query, limit=MOST_COMPARED), world)
         return describe_episodes(page, now=now, summed=whole.matches)
+
+    def _find(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
+        """Return the observations that pass a query, in the rooms of the map as it is now."""
+        find = self._session.find_episodes
+        if world is None:
+            return find(query)
+        if query.room_id is None:
+            page = find(query)
+            return replace(page, matches=tuple(_in_rooms_of(world, page.matches)))
+        whole = find(replace(query, room_id=None, limit=MOST_COMPARED, offset=0))
+        found = [
+            replace(match, filters=(*match.filters, EpisodeFilter.ROOM))
+            for match in _in_rooms_of(world, whole.matches)
+            if match.observation.room_id == query.room_id
+        ]
+        end = query.offset + query.limit
+        return EpisodePage(
+            matches=tuple(found[query.offset : end]),
+            n_matches=len(found),
+            anchor=whole.anchor,
+            next_page=replace(query, offset=end) if end < len(found) else None,
+        )
 
     def _recall_near_seen(
         self,
@@ -179,7 +210,7 @@ class MemoryTools:
         if nearby is None:
             seen = EpisodeQuery(words=words, since=query.since, until=query.until)
             query = replace(query, near=seen, radius_m=radius_m)
-            return self._list(query, now)
+            return self._list(query, now, world)
         query = replace(
             query,
             near=nearby.thing.point,
@@ -188,7 +219,7 @@ class MemoryTools:
             limit=MOST_NEAR_SEEN,
         )
         label = nearby.thing.thing.label
-        page = _without(label, query, self._session.find_episodes)
+        page = _without(label, query, lambda each: self._find(each, world))
         return f"{describe_nearby(world, nearby)}\n{describe_episodes(page, now=now)}"
 
     @tool("Note an event", ToolEffect.REMEMBERS, leads="{end_event} ends it.")
@@ -334,6 +365,16 @@ def _require_present_ids(world: WorldModel, words: str) -> None:
             say_renamed(renamed),
             hint=f"Nothing was changed; say {now} where that is meant.",
         )
+
+
+def _in_rooms_of(world: WorldModel, matches: Iterable[EpisodeMatch]) -> Iterator[EpisodeMatch]:
+    """Yield observations with the room that their place is in now: ids change as a map grows."""
+    for match in matches:
+        if match.is_elsewhere:
+            yield match
+            continue
+        room_id = world.find_room_id(match.observation.pose.point)
+        yield replace(match, observation=replace(match.observation, room_id=room_id))
 
 
 def _without(
