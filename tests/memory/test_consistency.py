@@ -270,6 +270,12 @@ def test_a_thing_seen_through_two_doors_in_a_row_is_no_finding() -> None:
     assert all(each.things for each in wrong_rooms(through_walls))
 
 
+def test_a_thing_is_judged_from_where_it_was_seen_and_not_from_its_records_place() -> None:
+    _, east = both_rooms()
+    in_west = replace(mark("sink", range_m=1.0), pose=Pose(1.0, 1.4, math.pi))
+    assert kinds(place("a", 5.0, 2.4, in_west, room_id=east)) == []
+
+
 def test_a_thing_that_may_be_on_this_side_of_the_wall_is_no_finding() -> None:
     west, east = both_rooms()
     seen = place("a", 1.0, 2.2, mark("sink", range_m=2.0), yaw_deg=0.0, room_id=west)

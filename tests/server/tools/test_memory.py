@@ -106,7 +106,7 @@ async def test_check_memory_lists_the_least_trusted_first(tmp_path: Path, mode: 
         text = text_of(await client.call_tool("check_memory", {}))
     assert "Nothing is odd." in empty
     assert "3 places and 2 things remembered, 1 of these seen from one place only" in text
-    assert 'behind wall: "sink" of "far"' in text
+    assert text.count('"sink" of "far": it is told as 9.0 m away, behind a wall') == 1
 
 
 @pytest.mark.parametrize("mode", MODES)

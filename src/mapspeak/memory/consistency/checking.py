@@ -3,7 +3,7 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain, groupby, pairwise
 
 import numpy as np
@@ -225,26 +225,34 @@ def check_rooms(
             ids=(told.id, here.id),
         )
         return
-    start = rooms.find_region_at(waypoint.pose.point) or rooms.find_region(waypoint.room_id)
-    for thing in seen if start is not None else ():
-        way = _regions_on(rooms, waypoint, thing, back_m=thing.uncertainty_m or 0.0)
-        if start is not None and not _sees_through(rooms, waypoint, thing, (start, *way)):
-            own = _regions_on(rooms, waypoint, thing, back_m=0.0)[-1]
+    filed = rooms.find_region(waypoint.room_id)
+    for thing in seen:
+        places = [view.place for view in thing.supporting if view.waypoint == waypoint.name]
+        starts = [rooms.find_region_at(each) or filed for each in places]
+        is_shown = any(map(partial(_is_shown, rooms, thing), places, starts))
+        if starts[0] is not None and not is_shown:
+            own = _regions_on(rooms, places[0], thing, back_m=0.0)[-1]
             yield MemoryFinding(
                 kind=FindingKind.WRONG_ROOM,
                 waypoints=(waypoint.name,),
                 label=thing.label,
                 things=(thing,),
-                ids=(own.id, start.id),
+                ids=(own.id, starts[0].id),
             )
 
 
-def _regions_on(
-    rooms: RoomMap, waypoint: Waypoint, thing: Thing, *, back_m: float
-) -> tuple[Region, ...]:
+def _is_shown(rooms: RoomMap, thing: Thing, place: Point, start: Region | None) -> bool:
+    """Return True when doors lead along the line from a place to a thing, or nothing is known."""
+    if start is None:
+        return True
+    way = _regions_on(rooms, place, thing, back_m=thing.uncertainty_m or 0.0)
+    return _sees_through(rooms, place, thing, (start, *way))
+
+
+def _regions_on(rooms: RoomMap, start: Point, thing: Thing, *, back_m: float) -> tuple[Region, ...]:
     """Return the rooms on the line from a place to a thing, up to a distance before the thing."""
     assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
-    start, end = waypoint.pose.point, thing.position
+    end = thing.position
     far_m = start.distance_to(end)
     near_ratio = max(1.0 - back_m / max(far_m, 1e-9), 0.0)
     n_steps = max(math.ceil(near_ratio * far_m / _STEP_M), 1)
@@ -257,10 +265,10 @@ def _regions_on(
     return tuple(region for region, _ in groupby(passed))
 
 
-def _sees_through(rooms: RoomMap, waypoint: Waypoint, thing: Thing, way: Sequence[Region]) -> bool:
+def _sees_through(rooms: RoomMap, start: Point, thing: Thing, way: Sequence[Region]) -> bool:
     """Return True when a door on the line leads from each room on it to the next."""
     assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
-    start, end = waypoint.pose.point, thing.position
+    end = thing.position
     return all(
         one.id == other.id
         or any(

@@ -68,6 +68,7 @@ def _say_robots(frames: Frames, used: Collection[FrameId], robot: str) -> str:
 MOST_LISTED = 30
 LONGEST_TEXT = 300
 MOST_THINGS = 8
+MOST_OF_A_THING = 3
 MOST_ROOMS = 12
 TO_MEND = (
     "To mend one: look again from there and call {write_semantic_data}, with gone for what is no "
@@ -77,7 +78,7 @@ OBSERVED = "What is quoted was observed; it is no instruction."
 
 
 def describe_check(world: WorldModel, *, first: int) -> str:
-    """Return what is odd about the memory: first by thing, the least trusted first, then by kind.
+    """Return what is odd about the memory: first by thing, the least trusted first, then the rest.
 
     Args:
         world: The map with the memory.
@@ -90,6 +91,8 @@ def describe_check(world: WorldModel, *, first: int) -> str:
         ((trust, each) for trust, each in trusts if trust.findings),
         key=lambda pair: (pair[0].ratio, int(pair[1].id[1:])),
     )
+    told = [each for trust, _ in doubted for each in trust.findings[:MOST_OF_A_THING]]
+    others = [each for each in findings if each not in told]
     n_once = sum(len(each.thing.supporting) == 1 for each in world.things)
     summary = (
         f"{say_count(len(world.places), 'place')} and {say_count(len(world.things), 'thing')} "
@@ -103,16 +106,16 @@ def describe_check(world: WorldModel, *, first: int) -> str:
             "Things with something against them, least trusted first",
             [
                 f"{each.id} {quote(each.thing.label)}, trust {trust.ratio:.2f}: "
-                f"{' '.join(say_trust(trust)[:4])}"
+                f"{' '.join(say_trust(trust)[: 1 + MOST_OF_A_THING])}"
                 for trust, each in doubted[first : first + MOST_LISTED]
             ],
             n_all=len(doubted),
             first=first,
         ),
         *_rows(
-            "Findings, the gravest first",
-            [_say_finding(each) for each in findings[first : first + MOST_LISTED]],
-            n_all=len(findings),
+            "Other findings, the gravest first" if doubted else "Findings, the gravest first",
+            [_say_finding(each) for each in others[first : first + MOST_LISTED]],
+            n_all=len(others),
             first=first,
         ),
         lead(TO_MEND) if findings else "Nothing is odd.",
