@@ -41,7 +41,7 @@ SAME_SIZE = 1.03
 """Floors that differ by less are equally large: maps round them so."""
 WAY_SLACK = 0.05
 SIZES = re.compile(
-    r"^Of (\d+) rooms.* the smallest is (R\d+|O\d+) .*?, then (R\d+|O\d+) .*"
+    r"^Of (\d+) (?:sure )?rooms.* the smallest is (R\d+|O\d+) .*?, then (R\d+|O\d+) .*"
     r"the largest is (R\d+|O\d+) ",
     re.MULTILINE,
 )

@@ -302,7 +302,7 @@ def _doors_of(world: WorldModel, region_id: str) -> set[str]:
 def _check_ranks(world: WorldModel, text: str) -> Iterator[Fact]:
     """Check which room is called the smallest and which the largest, over the whole map."""
     found = re.search(
-        r"^Of (\d+) rooms(?: so far)? the smallest is (\w+) .*?, then (\w+) .*?; "
+        r"^Of (\d+) (?:sure )?rooms(?: so far)? the smallest is (\w+) .*?, then (\w+) .*?; "
         r"the largest is (\w+) ",
         text,
         re.MULTILINE,

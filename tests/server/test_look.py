@@ -293,8 +293,23 @@ async def test_a_bay_that_may_be_part_of_a_room_is_named_apart_from_the_smallest
     grid = OccupancyGrid(cells=cells, resolution_m=0.2)
     async with connect(FakeRobot(grid, pose=Pose(1.5, 1.5)), tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
-    assert "The smaller room is R2 (10.5 m2), the larger R1 (19.5 m2)." in text
-    assert "Probably parts of others: R3 (3.3 m2)." in text
+    assert "The smaller sure room is R2 (10.5 m2), the larger R1 (19.5 m2)." in text
+    assert "Probably parts of others: R3 (3.3 m2, smaller than R2)." in text
+
+
+async def test_unsure_rooms_that_would_change_the_ranks_say_so(tmp_path: Path) -> None:
+    cells = np.full((34, 60), 100, np.int8)
+    west, east, opening = np.s_[1:21, 1:25], np.s_[1:21, 26:46], np.s_[8:21, 25]
+    north, south = np.s_[1:11, 47:58], np.s_[12:21, 47:58]
+    for floor in (west, east, north, south, opening, np.s_[4:8, 46], np.s_[14:18, 46]):
+        cells[floor] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.2)
+    async with connect(FakeRobot(grid, pose=Pose(1.5, 1.5)), tmp_path) as client:
+        text = text_of(await client.call_tool("look_at_map", {}))
+        largest = text_of(await client.call_tool("describe_place", {"place": "largest room"}))
+    assert "The smaller sure room is R4 (4.0 m2), the larger R3 (4.5 m2)." in text
+    assert "R2 (16.4 m2, larger than R3), R1 (19.5 m2, larger than R3)." in text
+    assert "unsure ones are left out: R1 (19.5 m2), R2 (16.4 m2)" in largest
 
 
 async def test_a_corridor_that_bends_has_one_size_in_the_table_and_where_it_is_described(

@@ -194,8 +194,8 @@ def _measure_way(
 
 def _sort_by_size(
     world: WorldModel, kind: Kind, order: Order
-) -> tuple[list[Ranked], tuple[str, ...]]:
-    """Return the things of a kind in the order of their size, and the ids of those left out.
+) -> tuple[list[Ranked], tuple[Ranked, ...]]:
+    """Return the things of a kind in the order of their size, and those left out.
 
     Rooms that may be parts of others are left out, unless all are such.
 
@@ -209,11 +209,13 @@ def _sort_by_size(
         for each in _list(world, kind, SIZED_CLASSES)
         if not isinstance(each, RememberedPlace)
     ]
-    sure = [(size, each) for size, each in found if not _is_unsure(world, each)]
-    unsure = tuple(each.id for _, each in found if _is_unsure(world, each)) if sure else ()
     sign = -1 if order is Order.LARGEST else 1
-    ranked = [Ranked(size, each) for size, each in sure or found]
-    return sorted(ranked, key=lambda each: sign * each.value), unsure
+    ranked = sorted(
+        (Ranked(size, each) for size, each in found), key=lambda each: sign * each.value
+    )
+    sure = [each for each in ranked if not _is_unsure(world, each.thing)]
+    unsure = tuple(each for each in ranked if _is_unsure(world, each.thing)) if sure else ()
+    return sure or ranked, unsure
 
 
 def _size_of(thing: Sized) -> float:
@@ -244,7 +246,7 @@ def _is_at(world: WorldModel, thing: Sized | RememberedPlace, at: Referent | Non
 
 
 def _say_size(
-    world: WorldModel, found: Ranked, n_all: int, title: str, kind: Kind, unsure: Sequence[str]
+    world: WorldModel, found: Ranked, n_all: int, title: str, kind: Kind, unsure: Sequence[Ranked]
 ) -> str:
     thing = found.thing
     unit = "m wide" if isinstance(thing, Door) else "m2"
@@ -257,7 +259,8 @@ def _say_size(
         said += ", not all seen"
     if isinstance(thing, Region) and _is_unsure(world, thing):
         said += ", unsure"
-    return f"{said}; unsure ones are left out: {', '.join(unsure)}" if unsure else said
+    left = ", ".join(f"{each.thing.id} ({each.value:.{digits}f} {unit})" for each in unsure)
+    return f"{said}; unsure ones are left out: {left}" if left else said
 
 
 def _say_way(world: WorldModel, found: Ranked, start: Referent | None) -> str:

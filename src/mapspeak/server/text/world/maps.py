@@ -61,18 +61,18 @@ def say_ranks(names: Sequence[str], *, is_of_all: bool, has_unsure: bool, so_far
         has_unsure: There are others that may be parts of rooms.
         so_far: " so far" where more may come.
     """
-    among = so_far if is_of_all else " of these"
+    among, kind = (so_far if is_of_all else " of these"), ("sure room" if has_unsure else "room")
     match names:
         case []:
             nothing = "No room is known yet." if is_of_all else "No room is among these."
             return "No room is sure yet." if has_unsure else nothing
         case [only]:
-            return f"The only {'sure ' if has_unsure else ''}room{among}: {only}."
+            return f"The only {kind}{among}: {only}."
         case [smallest, largest]:
-            return f"The smaller room{among} is {smallest}, the larger {largest}."
+            return f"The smaller {kind}{among} is {smallest}, the larger {largest}."
         case [smallest, second, *_, largest]:
             n_rooms = len(names)
-            counted = f"{n_rooms} rooms{so_far}" if is_of_all else f"these {n_rooms} rooms"
+            counted = f"{n_rooms} {kind}s{so_far}" if is_of_all else f"these {n_rooms} {kind}s"
             return (
                 f"Of {counted} the smallest is {smallest}, then {second}; the largest is {largest}."
             )

@@ -269,8 +269,8 @@ def room_tables(view: MapView, told: Told) -> str:
 def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     """Say which room is the smallest and which the largest, corridors left out.
 
-    Rooms that may be parts of others are not counted, and named apart. The words tell whether these
-    are some or all of the rooms.
+    Rooms that may be parts of others are not counted, and named apart with what they would change.
+    The words tell whether these are some or all of the rooms.
     """
     rooms = _rooms_by_size(regions)
     is_of_all = len(rooms) == len(_rooms_by_size(world.rooms.regions))
@@ -278,7 +278,9 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     doors = [world.rooms.find_doubtful_door(room) for room in rooms]
     sure = [room for room, door in zip(rooms, doors, strict=True) if door is None]
     unsure = [
-        (_say_size(world, room), door) for room, door in zip(rooms, doors, strict=True) if door
+        (f"{room.id} ({_say_floor(world, room)} m2{_say_against(sure, room)})", door)
+        for room, door in zip(rooms, doors, strict=True)
+        if door
     ]
     names = [_say_size(world, room) for room in sure]
     lines = [say_ranks(names, is_of_all=is_of_all, has_unsure=bool(unsure), so_far=so_far)]
@@ -286,6 +288,15 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
         if smallest.floor_area_m2 + world.growth_m2.get(smallest.id, 0) > second.floor_area_m2:
             lines.append(f"{smallest.id} may turn out larger than {second.id}.")
     return " ".join([*lines, *say_unsure(unsure)])
+
+
+def _say_against(sure: Sequence[Region], room: Region) -> str:
+    """Say where an unsure room would be the smallest or the largest."""
+    if not sure:
+        return ""
+    if room.floor_area_m2 < sure[0].floor_area_m2:
+        return f", smaller than {sure[0].id}"
+    return f", larger than {sure[-1].id}" if room.floor_area_m2 > sure[-1].floor_area_m2 else ""
 
 
 def say_walk(region: Region, walk: CorridorWalk) -> str:
