@@ -16,7 +16,7 @@ from mapspeak.evaluation.agents.driver import read_map_picture, read_map_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.pictures import PictureBook, TakenPicture
-from mapspeak.robot import Detection, NavigationLook, NavigationPart
+from mapspeak.robot import Detection, GoalState, NavigationLook, NavigationPart
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S
 from served import MODES, connect, pictures_of, report_of, text_of
@@ -83,6 +83,17 @@ async def test_a_picture_does_not_wait_for_a_map_that_does_not_come(tmp_path: Pa
         with anyio.fail_after(PATIENCE_S):
             picture = await client.call_tool("look_through_camera", {})
     assert pictures_of(picture)
+
+
+async def test_a_picture_on_the_way_says_that_its_drive_has_not_ended(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("navigate_to", {"place": "R1", "wait_s": 0})
+        under_way = text_of(await client.call_tool("look_through_camera", {}))
+        robot.end_goal(GoalState.ARRIVED)
+        ended = text_of(await client.call_tool("look_through_camera", {}))
+    assert "Taken on the way: G1 to R1 has not ended. Call wait_for_goal." in under_way
+    assert "on the way" not in ended
 
 
 async def test_an_assumed_size_of_the_robot_is_said(tmp_path: Path) -> None:
@@ -295,6 +306,21 @@ async def test_a_bay_that_may_be_part_of_a_room_is_named_apart_from_the_smallest
         text = text_of(await client.call_tool("look_at_map", {}))
     assert "The smaller sure room is R2 (10.5 m2), the larger R1 (19.5 m2)." in text
     assert "Probably parts of others: R3 (3.3 m2, smaller than R2)." in text
+
+
+async def test_a_map_with_a_frontier_is_never_called_known_as_a_whole(tmp_path: Path) -> None:
+    cells = np.full((302, 302), 100, np.int8)
+    cells[1:-1, 1:-1], cells[150:155, -1] = 0, -1
+    cells = np.hstack([cells, np.full((302, 4), -1, np.int8)])
+    robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.5), pose=Pose(125.0, 75.0))
+    async with connect(robot, tmp_path) as client:
+        text = text_of(await client.call_tool("look_at_map", {}))
+    known_m2, expected_m2, percent = re.search(
+        r"Explored: ([\d.]+) m2 of free floor, of about (\d+) to be expected by now: (\d+) %", text
+    ).groups()
+    assert "1 frontier" in text
+    assert float(expected_m2) > float(known_m2) > 0.995 * float(expected_m2)
+    assert percent == "99"
 
 
 async def test_unsure_rooms_that_would_change_the_ranks_say_so(tmp_path: Path) -> None:

@@ -123,8 +123,13 @@ class Progress:
 def known_ratio(world: WorldModel) -> float:
     """Return the known share of the floor that is to be expected: what frontiers promise is not."""
     known_m2 = known_area_m2(world)
+    return known_m2 / expected_area_m2(world) if known_m2 else 0.0
+
+
+def expected_area_m2(world: WorldModel) -> float:
+    """Return the free floor on the map and what frontiers promise; it grows with what is seen."""
     promised_m2 = sum(frontier.gain_m2 for frontier in world.frontiers.frontiers)
-    return known_m2 / (known_m2 + promised_m2) if known_m2 else 0.0
+    return known_area_m2(world) + promised_m2
 
 
 def known_area_m2(world: WorldModel) -> float:

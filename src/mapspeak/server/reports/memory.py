@@ -216,7 +216,8 @@ class RecallAnswer(Report):
     @property
     def text(self) -> str:
         """The answer in lines: what to do, a line for each candidate, what speaks for the first."""
-        heading = f"{self.n_fitting} of {self.n_searched} fit {quote(self.understood)} best"
+        fitting = f"{self.n_fitting} fit{'s' * (self.n_fitting == 1)} {quote(self.understood)} best"
+        heading = f"{len(self.candidates)} of {self.n_searched}, the likest first; {fitting}"
         lines = [self.advice]
         for first in self.candidates[:1]:
             lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))

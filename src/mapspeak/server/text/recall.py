@@ -155,7 +155,8 @@ def _say_several(answer: Answer, first: RecallCandidate) -> str:
 
 
 def _say_unsure(answer: Answer, first: RecallCandidate) -> str:
-    kind = f" (it is more like {quote(answer.missing)})" if answer.missing else ""
+    missing = quote(answer.missing or "")
+    kind = f" (the words are nearer to {missing}, and none is remembered)" if answer.missing else ""
     n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
     path_m = first.check.path_m
     facts = (

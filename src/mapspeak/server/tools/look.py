@@ -1,14 +1,17 @@
 """The tools that only look: map, camera, pose."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Annotated
 
 from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
+from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
+from mapspeak.server.text.world.drives import say_on_the_way
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.world.look import Layer, MapLook, MapView, Up, look_at, view_of
 from mapspeak.server.text.world.tables import list_subjects
@@ -97,8 +100,23 @@ class LookTools:
         """
         sighting = await look_ahead(self._session, camera)
         others = "" if camera else ", ".join(self._session.robot.description.cameras[1:])
-        told = f"{sighting.text}\nOther cameras: {others}." if others else sighting.text
-        return [told, sighting.image]
+        under_way = await self._find_drive()
+        said = [
+            sighting.text,
+            *([f"Other cameras: {others}."] if others else []),
+            *([] if under_way is None else [say_on_the_way(under_way)]),
+        ]
+        return ["\n".join(said), sighting.image]
+
+    async def _find_drive(self) -> Drive | None:
+        """Return the drive that the robot is on; None also where it cannot be asked."""
+        drives = self._session.drives
+        if drives.under_way is None:
+            return None
+        with suppress(LinkError):
+            report = await drives.report(drives.under_way.goal_id)
+            return None if report.status.state.is_final else report.drive
+        return None
 
     @tool("Where the robot is", ToolEffect.READS, has_report=True)
     async def get_robot_pose(self) -> PoseAnswer:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from mapspeak.driving.drivereport import Drive
 from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
 from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
 from mapspeak.driving.exploration.trips import Target
@@ -13,6 +14,7 @@ from mapspeak.driving.search.progress import BudgetKind, SearchProgress, SearchS
 from mapspeak.errors import LinkError
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_point
 from mapspeak.server.text.world.maps import say_merits, say_refusal
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
@@ -114,6 +116,12 @@ def say_cause(cause: Cause | None) -> str:
 def say_end(status: GoalStatus) -> str:
     """Say why a drive ended as it did, with what became of it since; empty where nobody said."""
     return " ".join(filter(None, (say_cause(status.cause), status.afterwards)))
+
+
+def say_on_the_way(drive: Drive) -> str:
+    """Say of a picture that it was not taken at a drive's end."""
+    said = f"Taken on the way: {drive.goal_id} to {drive.place} has not ended."
+    return " ".join(filter(None, (said, lead("Call {wait_for_goal}."))))
 
 
 def say_route(progress: RouteProgress) -> str:

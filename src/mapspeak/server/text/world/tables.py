@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
-from mapspeak.driving.exploration.progress import known_area_m2, known_ratio
+from mapspeak.driving.exploration.progress import expected_area_m2, known_area_m2, known_ratio
 from mapspeak.memory.quoting import quote
 from mapspeak.places.standing import choose_standing_point, find_standing_point
 from mapspeak.server.text.wording import (
@@ -77,6 +77,15 @@ def describe_world(view: MapView, told: Told | None = None) -> str:
     return "\n\n".join([_summary(view, told), *closed, *filter(None, shown)])
 
 
+def _say_explored(world: WorldModel) -> str:
+    """Say how much floor is known, and of how much: a share alone falls when more comes in view."""
+    # Not all of it, as long as there is a frontier to go to.
+    most = 99 if world.frontiers.frontiers else 100
+    percent = min(round(100 * known_ratio(world)), most)
+    expected = f"{expected_area_m2(world):.0f} to be expected by now: {percent} %."
+    return f"{known_area_m2(world):.1f} m2 of free floor, of about {expected}"
+
+
 def list_subjects(world: WorldModel) -> frozenset[str]:
     """Return what a reader may have been told of: ids, frontiers left out, and the picture."""
     regions, doors, places = world.rooms.regions, world.rooms.doors, world.places
@@ -86,12 +95,11 @@ def list_subjects(world: WorldModel) -> frozenset[str]:
 def _summary(view: MapView, told: Told) -> str:
     world, look = view.world, view.look
     room_id = world.find_room_id(world.robot.point) or "no room"
-    explored = f"{known_area_m2(world):.1f} m2 of free floor, {100 * known_ratio(world):.0f} %"
     width = f" It is {2 * world.radius_m:.2f} m wide." if told.is_first else ""
     lines = [
         *say_warnings(world),
         f"Robot: {say_pose(world.robot)}, in {room_id}.{width}",
-        f"Explored: {explored} of what is expected. {say_verdict(world.frontiers)}",
+        f"Explored: {_say_explored(world)} {say_verdict(world.frontiers)}",
     ]
     if Layer.ROOMS in look.layers:
         shown = look.regions(world)
