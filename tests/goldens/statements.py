@@ -215,7 +215,7 @@ def _check_look(
     if found := re.search(rf"^Robot: x ({NUMBER}), y ({NUMBER})", text, re.MULTILINE):
         at = float(found[1]), float(found[2])
         yield "the robot's pose", math.dist(at, _robot(world)) <= 2 * ROUNDING
-    if found := re.search(rf"^Explored: ({NUMBER}) m2", text, re.MULTILINE):
+    if found := re.search(rf"^Explored: ({NUMBER}) (?:m2|of)", text, re.MULTILINE):
         free_m2 = int(((cells >= 0) & (cells < FREE_BELOW)).sum()) * cell_m2
         yield f"explored {found[1]} m2, not {free_m2:.1f}", abs(float(found[1]) - free_m2) < 0.06
     tables = read_tables(text)

@@ -79,11 +79,12 @@ def describe_world(view: MapView, told: Told | None = None) -> str:
 
 def _say_explored(world: WorldModel) -> str:
     """Say how much floor is known, and of how much: a share alone falls when more comes in view."""
+    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
+    if not world.frontiers.frontiers:
+        return f"{known_m2:.1f} m2 of free floor, {percent} %."
     # Not all of it, as long as there is a frontier to go to.
-    most = 99 if world.frontiers.frontiers else 100
-    percent = min(round(100 * known_ratio(world)), most)
-    expected = f"{expected_area_m2(world):.0f} to be expected by now: {percent} %."
-    return f"{known_area_m2(world):.1f} m2 of free floor, of about {expected}"
+    expected = f"about {expected_area_m2(world):.0f} m2 of free floor, {min(percent, 99)} %."
+    return f"{known_m2:.1f} of {expected}"
 
 
 def list_subjects(world: WorldModel) -> frozenset[str]:
