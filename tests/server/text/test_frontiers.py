@@ -38,7 +38,6 @@ def refused(reason: RefusalReason) -> RefusedFrontier:
         reason=reason,
         gap_width_m=0.2,
         needed_width_m=0.4,
-        gain_m2=0.12,
         least_gain_m2=0.5,
     )
 
@@ -70,7 +69,7 @@ def test_merits_are_short_however_much_there_is_to_say() -> None:
     [
         (RefusalReason.NO_WAY, "behind a wall: no way over known floor"),
         (RefusalReason.TOO_NARROW, "gap of 0.2 m, the robot needs 0.40 m"),
-        (RefusalReason.NOTHING_TO_SEE, "0.12 m2 to see, less than 0.50 m2"),
+        (RefusalReason.NOTHING_TO_SEE, "less than 0.50 m2 to see"),
         (RefusalReason.LOOKED_ALREADY, "visited already, nothing new came into view"),
         (
             RefusalReason.DRIVE_FAILED,

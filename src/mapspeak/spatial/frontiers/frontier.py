@@ -85,7 +85,6 @@ class RefusedFrontier:
         gap_width_m: Width of the way at its narrowest, if too narrow.
         gap_at: Where the gap is that the robot did not pass.
         needed_width_m: Width of the robot, if the way is too narrow.
-        gain_m2: Expected gain, if there is too little to see.
         least_gain_m2: Gain worth a drive, if there is too little to see.
     """
 
@@ -95,7 +94,6 @@ class RefusedFrontier:
     gap_width_m: float = 0.0
     gap_at: Point | None = None
     needed_width_m: float = 0.0
-    gain_m2: float = 0.0
     least_gain_m2: float = 0.0
 
 

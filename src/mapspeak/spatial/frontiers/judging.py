@@ -110,7 +110,7 @@ def _judge(
     """
     frontiers: list[Frontier] = []
     refused: list[RefusedFrontier] = []
-    poor: list[tuple[Border, float]] = []
+    poor: list[Border] = []
     cut_off: list[Border] = []
     open_ones: list[tuple[Border, list[FrontierViewpoint]]] = []
     all_viewpoints = find_viewpoints(distances, borders)
@@ -130,12 +130,11 @@ def _judge(
         if frontier.gain_m2 >= least_m2:
             frontiers.append(frontier)
         elif border.length_m >= NOISE_M:
-            poor.append((border, frontier.gain_m2))
-    parts_beyond = find_parts_beyond(distances, [border for border, _ in poor])
-    for (border, gain_m2), beyond in zip(poor, parts_beyond, strict=True):
+            poor.append(border)
+    for border, beyond in zip(poor, find_parts_beyond(distances, poor), strict=True):
         if beyond is None:
             why = RefusalReason.NOTHING_TO_SEE
-            refused.append(_refuse(distances, border, why, gain_m2=gain_m2, least_gain_m2=least_m2))
+            refused.append(_refuse(distances, border, why, least_gain_m2=least_m2))
         else:
             cut_off.append(beyond)
     return frontiers, refused + _refuse_cut_off(distances, cut_off)
@@ -225,7 +224,6 @@ def _refuse(
     *,
     gap_width_m: float = 0.0,
     needed_width_m: float = 0.0,
-    gain_m2: float = 0.0,
     least_gain_m2: float = 0.0,
 ) -> RefusedFrontier:
     middle = find_middle(border.rows, border.cols)
@@ -236,7 +234,6 @@ def _refuse(
         reason=reason,
         gap_width_m=gap_width_m,
         needed_width_m=needed_width_m,
-        gain_m2=gain_m2,
         least_gain_m2=least_gain_m2,
     )
 

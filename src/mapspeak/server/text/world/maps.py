@@ -163,7 +163,8 @@ def say_refusal(border: RefusedFrontier) -> str:
                 "no way through it"
             )
         case RefusalReason.NOTHING_TO_SEE:
-            return f"{border.gain_m2:.2f} m2 to see, less than {border.least_gain_m2:.2f} m2"
+            # Without its own gain, so that a list of borders says it once.
+            return f"less than {border.least_gain_m2:.2f} m2 to see"
     return REFUSALS[border.reason]
 
 
