@@ -56,8 +56,8 @@ KnownPercent = Annotated[
 StopsAtGoals = Annotated[
     bool,
     Field(
-        description="pause with a camera picture wherever the robot arrives, or has seen from afar "
-        "what it was sent to see"
+        description="pause with a camera picture where the robot arrives, or has seen from afar "
+        "what it was sent to see, 3 m or more from the last pause"
     ),
 ]
 Cover = Annotated[
