@@ -11,8 +11,8 @@ from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
-from mapspeak.server.text.world.drives import say_on_the_way
 from mapspeak.server.text.findings import say_moved
+from mapspeak.server.text.world.drives import say_on_the_way
 from mapspeak.server.text.world.look import Layer, MapLook, MapView, Up, look_at, view_of
 from mapspeak.server.text.world.tables import list_subjects
 from mapspeak.server.text.world.told import Told
