@@ -104,7 +104,7 @@ class Things:
 
     def is_over_furniture(self, waypoint: Waypoint, point: Point) -> bool:
         """Return True when one sees towards a point over something that stands on the way."""
-        seen, ray = self.surroundings[waypoint], self._ray(waypoint.pose, point)
+        seen, ray = self._surroundings(waypoint), self._ray(waypoint.pose, point)
         near_m, grid = float(seen.near_m[ray]), self.sight.grid
         if near_m >= seen.far_m[ray]:
             return False
