@@ -315,9 +315,9 @@ async def test_a_map_with_a_frontier_is_never_called_known_as_a_whole(tmp_path: 
     robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.5), pose=Pose(125.0, 75.0))
     async with connect(robot, tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
-    known_m2, expected_m2, percent = re.search(
+    ((known_m2, expected_m2, percent),) = re.findall(
         r"Explored: ([\d.]+) of about (\d+) m2 of free floor, (\d+) %", text
-    ).groups()
+    )
     assert "1 frontier" in text
     assert float(expected_m2) > float(known_m2) > 0.995 * float(expected_m2)
     assert percent == "99"
