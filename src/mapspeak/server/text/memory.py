@@ -81,7 +81,6 @@ def describe_check(world: WorldModel, *, first: int) -> str:
     """Return what is odd about the memory: first by thing, the least trusted first, then the rest.
 
     Args:
-        world: The map with the memory.
         first: The number of the row to begin with, of both lists.
     """
     judge = world.judge
@@ -100,8 +99,7 @@ def describe_check(world: WorldModel, *, first: int) -> str:
         f"{say_count(len(findings), 'finding')}. A finding lowers trust and takes nothing away."
     )
     lines = [
-        summary,
-        OBSERVED,
+        *(summary, OBSERVED),
         *_rows(
             "Things with something against them, least trusted first",
             [
@@ -113,7 +111,7 @@ def describe_check(world: WorldModel, *, first: int) -> str:
             first=first,
         ),
         *_rows(
-            "Other findings, the gravest first" if doubted else "Findings, the gravest first",
+            f"{'Other findings' if doubted else 'Findings'}, the gravest first",
             [_say_finding(each) for each in others[first : first + MOST_LISTED]],
             n_all=len(others),
             first=first,
