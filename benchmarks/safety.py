@@ -113,7 +113,8 @@ def make_guard(folder: Path, policy: Policy) -> Guard:
 
     return Guard(
         policy=policy,
-        audit=AuditLog(folder / "audit.jsonl", wall_clock=now),
+        # The whole log is judged: it must not begin anew.
+        audit=AuditLog(folder / "audit.jsonl", wall_clock=now, most_bytes=10**12),
         hold=Hold(folder / "control"),
         approvals=Approvals(WaitingRoom(folder / "control" / "approvals"), time.monotonic),
         wall_clock=now,
