@@ -658,6 +658,30 @@ async def test_who_gives_up_while_the_robot_accepts_a_goal_gives_up_the_goal(
     assert list(fake.ended) == ["fake-1"]
 
 
+async def test_who_gives_up_asking_while_a_leg_is_sent_does_not_give_up_the_drive(
+    tmp_path: Path,
+) -> None:
+    fake = SlowRobot(HALL, pose=WEST)
+    fake.meanwhile = anyio.lowlevel.checkpoint
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    goal_id = await robot.send_goal(EAST)
+    leg = fake.goals["fake-1"]
+    while fake.pose.point.distance_to(leg.point) > 0.01:
+        await fake.sleep(0.5)
+    with anyio.CancelScope() as scope:
+
+        async def give_up() -> None:
+            scope.cancel()
+            await anyio.lowlevel.checkpoint()
+
+        fake.meanwhile = give_up
+        await robot.fetch_goal_status(goal_id)
+    fake.meanwhile = anyio.lowlevel.checkpoint
+    await robot.sleep(30.0)
+    assert fake.pose == EAST
+    assert (await robot.fetch_goal_status(goal_id)).state is GoalState.ARRIVED
+
+
 async def test_a_newer_goal_ends_the_older_one_in_the_log_too(tmp_path: Path) -> None:
     robot = guarded(FakeRobot(two_rooms()), tmp_path)
     await robot.send_goal(FAR)

@@ -278,7 +278,9 @@ class GuardedRobot:
         said = f"on to ({leg.x:.2f}, {leg.y:.2f})"
         self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
         try:
-            drive.leg_id = await self._robot.send_goal(leg)
+            # Who gives up asking how a drive stands does not give up the drive.
+            with anyio.CancelScope(shield=True):
+                drive.leg_id = await self._robot.send_goal(leg)
         except BaseException as error:
             # Whether the robot took the leg is unknown: it must not drive unnoticed.
             cause = Cause(code=CauseCode.NOT_SENT_ON, quote=_say_error(error))
