@@ -13,6 +13,7 @@ from cyclonedds.sub import DataReader
 from mapspeak.errors import LinkError
 from mapspeak.links.endpoints import Decode, Sample, Take, full_type, understand
 from mapspeak.ros.activity import News
+from mapspeak.ros.port import EndQuality
 
 TOPIC, REQUEST, REPLY = "rt", "rq", "rr"
 DISCOVERY_TOPIC = "ros_discovery_info"
@@ -89,16 +90,9 @@ class RawMessage(IdlStruct):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Quality:
-    """The part of DDS's quality of service that ROS uses most.
+class Quality(EndQuality):
+    """The part of DDS's quality of service that ROS uses most, with how many samples are kept."""
 
-    Attributes:
-        is_reliable: Lost samples are sent again.
-        is_latched: A late reader gets the last samples ("transient local").
-    """
-
-    is_reliable: bool
-    is_latched: bool
     depth: int
 
     @property
