@@ -127,11 +127,13 @@ class Session:
 
     async def client_is_gone(self, client: str) -> None:
         """Stop the robot when the client that sent it somewhere has gone away."""
+        cause = Cause(code=CauseCode.CLIENT_GONE)
+        self.drives.dismiss(cause, client=client)
         drive = self.drives.under_way
         is_drivers = self.drives.is_busy and (drive is None or drive.client == client)
         if is_drivers or client in started_over(self.ros).owners:
             logger.warning("The client hung up during its drive: stopping the robot.")
-            await self.drives.stop(Cause(code=CauseCode.CLIENT_GONE))
+            await self.drives.stop(cause)
 
     @property
     def _is_busy(self) -> bool:
@@ -299,17 +301,13 @@ class Session:
 
     async def _learn(self, revision: MapRevision) -> bool:
         """Remember what the last drive tells of doors; true when that changes ways."""
-        drive, wall_time = self.drives.last_ended, self.find_wall_time()
-        is_new = drive is not None and drive.goal_id != self._learned_from
-        if drive is None or not is_new or wall_time is None:
+        drive, wall_time = next(reversed(self.drives.ended), None), self.find_wall_time()
+        if drive is None or wall_time is None or drive.goal_id == self._learned_from:
             return False
         self._learned_from = drive.goal_id
         try:
-            return bool(
-                await self.compute(
-                    lambda: learn_from_drive(drive, self.memory, revision=revision, now=wall_time)
-                )
-            )
+            learn = partial(learn_from_drive, drive, self.memory, revision=revision, now=wall_time)
+            return bool(await self.compute(learn))
         except SemanticMapError as error:
             logger.warning("What the drive tells of doors is not remembered: %s", error)
             return False

@@ -16,12 +16,7 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.driving.drivemonitor import DriveMonitor, Look
-from mapspeak.driving.drivereport import (
-    JUST_SENT,
-    Drive,
-    DriveReport,
-    find_failed,
-)
+from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_failed
 from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
@@ -33,8 +28,6 @@ POLL_S = 0.2
 PROGRESS_S = 1.0
 N_KEPT = 200
 WAS_STOPPED = Cause(code=CauseCode.STOPPED)
-
-
 OnProgress = Callable[[DriveReport], Awaitable[None]]
 
 logger = logging.getLogger(__name__)
@@ -75,11 +68,6 @@ class DriveBook:
     def under_way(self) -> Drive | None:
         """The drive that has not ended yet, as far as anyone has asked."""
         return next((each for each in self._open() if each.robot_goal_id is not None), None)
-
-    @property
-    def last_ended(self) -> Drive | None:
-        """The drive that was started last of those that have ended, as far as anyone has asked."""
-        return next((each for each in reversed(self._drives.values()) if each.final), None)
 
     @property
     def ended(self) -> tuple[Drive, ...]:
@@ -158,6 +146,7 @@ class DriveBook:
                 self._end_all(Cause(code=CauseCode.REPLACED), but=drive)
                 return drive
             if when_busy is WhenBusy.WAIT:
+                self.dismiss(Cause(code=CauseCode.REPLACED), client=client)
                 return self._keep(drive)
             raise GoalError(
                 f"{busy.goal_id} to {busy.place} is under way.",
@@ -199,6 +188,8 @@ class DriveBook:
 
         Cancelling the wait cancels the drive and stops the robot.
         """
+        if goal_id is None and self._drives:
+            goal_id = self._find(None).goal_id
         try:
             return await self._wait(goal_id, wait_s, on_progress)
         except anyio.get_cancelled_exc_class():
@@ -228,6 +219,8 @@ class DriveBook:
 
     async def _abandon(self, goal_id: str | None) -> None:
         """End a drive whose caller gave up; if the robot is out of reach, once it is back."""
+        if goal_id is None:
+            return
         drive = self._find(goal_id)
         try:
             await self.cancel(drive.goal_id)
@@ -262,7 +255,7 @@ class DriveBook:
         """
         self._n_stops += 1
         with anyio.CancelScope(shield=True):
-            self._dismiss(cause)
+            self.dismiss(cause)
             if (drive := self.under_way) is not None:
                 self._owed.owe(drive.goal_id)
             await self._robot.stop()
@@ -271,6 +264,12 @@ class DriveBook:
                 report = await self.report(drive.goal_id)
                 if report.status.state is GoalState.CANCELLED:
                     self._keep(replace(report.drive, final=replace(report.status, cause=cause)))
+
+    def dismiss(self, cause: Cause, *, client: str | None = None) -> None:
+        """End the drives that wait their turn, those of one client or all."""
+        for drive in self._waiting():
+            if client in (None, drive.client):
+                self._end(drive, GoalStatus(state=GoalState.CANCELLED, cause=cause))
 
     # --- inside ---
 
@@ -281,11 +280,6 @@ class DriveBook:
     def _waiting(self) -> list[Drive]:
         """Return the drives that wait their turn, in their order."""
         return [each for each in self._open() if each.robot_goal_id is None]
-
-    def _dismiss(self, cause: Cause | None) -> None:
-        """End the drives that wait."""
-        for drive in self._waiting():
-            self._end(drive, GoalStatus(state=GoalState.CANCELLED, cause=cause))
 
     async def _find_busy(self) -> Drive | None:
         """Find the drive that is under way, after asking the robot whether it has ended."""
@@ -305,11 +299,20 @@ class DriveBook:
     async def _send(self, drive: Drive) -> Drive:
         """Send a drive to the robot, which gives up whatever it was doing."""
         await self._owed.wait_for_stop()
-        drive = replace(drive, started_s=self._robot.now_s)
-        drive = replace(drive, robot_goal_id=await self._robot.send_goal(drive.goal))
+        self._check_ticket(drive.ticket)
+        started_s = self._robot.now_s
+        robot_goal_id = await self._robot.send_goal(drive.goal)
         self._owed.forgive()
         self._monitor.begin()
-        return self._keep(replace(drive, heard=JUST_SENT))
+        # It may have been ended while it was sent.
+        drive = self._drives.get(drive.goal_id, drive)
+        drive = self._keep(
+            replace(drive, started_s=started_s, robot_goal_id=robot_goal_id, heard=JUST_SENT)
+        )
+        if drive.final is not None:
+            self._owed.owe(drive.goal_id)
+            await self._owed.stop()
+        return drive
 
     def _end_all(self, cause: Cause, *, but: Drive) -> None:
         """Note that all drives but one are over: the robot has one goal."""
@@ -339,7 +342,7 @@ class DriveBook:
         if end is None and drive.robot_goal_id is not None:
             end = self._monitor.judge(look)
             if end is not None:
-                self._dismiss(Cause(code=CauseCode.PREVIOUS_ENDED, previous=end.cause))
+                self.dismiss(Cause(code=CauseCode.PREVIOUS_ENDED, previous=end.cause))
         if end is None:
             return
         self._end(drive, end)
@@ -385,12 +388,13 @@ class DriveBook:
 
     def _end(self, drive: Drive, status: GoalStatus) -> None:
         """Note how a drive ended; the first word counts."""
+        drive = self._drives.get(drive.goal_id, drive)
         if drive.final is None:
             self._keep(replace(drive, final=status, ended_s=self._robot.now_s))
 
     def _keep(self, drive: Drive) -> Drive:
         self._n_started += drive.goal_id not in self._drives
         self._drives[drive.goal_id] = drive
-        while len(self._drives) > N_KEPT:
-            del self._drives[next(iter(self._drives))]
+        for old in self.ended[: max(len(self._drives) - N_KEPT, 0)]:
+            del self._drives[old.goal_id]
         return drive

@@ -59,13 +59,11 @@ class Look:
 
     Attributes:
         status: How it stands, or stood when it was heard last.
-        jump_m: How far the pose jumped; None where it did not.
         doubt: What of the robot is missing.
         error: Why.
     """
 
     status: GoalStatus
-    jump_m: float | None = None
     doubt: PoseDoubt | None = None
     error: LinkError | None = None
 
@@ -104,15 +102,18 @@ class DriveMonitor:
         self._moved_at: Pose | None = None
         self._heard_s: float | None = None
         self._is_silent = False
+        self._jump_m: float | None = None
 
-    async def find_robot(self) -> float | None:
-        """Look where the robot is; return how far its pose jumped.
+    async def find_robot(self) -> None:
+        """Look where the robot is.
 
         Raises:
             LinkError: The robot does not say where it is.
         """
         self._seen, self._seen_s = await self._robot.fetch_pose(), self._wall_s()
-        return self._odometer.take(self._seen)
+        jump_m = self._odometer.take(self._seen)
+        # Kept until the drive under way is judged: this look may be for another.
+        self._jump_m = self._jump_m if jump_m is None else jump_m
 
     async def look(self, drive: Drive) -> Look:
         """Ask how a drive stands and where the robot is."""
@@ -120,7 +121,8 @@ class DriveMonitor:
         try:
             status = await self._fetch_status(drive)
             doubt = PoseDoubt.NO_POSE
-            return Look(status=status, jump_m=await self.find_robot())
+            await self.find_robot()
+            return Look(status=status)
         except LinkError as error:
             return Look(status=status, doubt=doubt, error=error)
 
@@ -146,8 +148,8 @@ class DriveMonitor:
             # What happened in the silence is unknown: the robot may have moved all the time.
             self._moved_at = None
         self._heard_s, self._is_silent = self._wall_s() - self._seen.silent_s, False
-        if look.jump_m is not None:
-            cause = Cause(code=CauseCode.POSE_JUMPED, distance_m=look.jump_m)
+        if self._jump_m is not None:
+            cause = Cause(code=CauseCode.POSE_JUMPED, distance_m=self._jump_m)
             return GoalStatus(state=GoalState.LOST, cause=cause)
         return self._judge_progress(look.status)
 
