@@ -9,6 +9,7 @@ import anyio
 from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.robot import GoalState, GoalStatus, Robot
+from mapspeak.safety import NOBODY, calling
 
 NEWS_S = 0.5
 """Wall time from the robot's return until its navigation has told how goals stand."""
@@ -53,7 +54,7 @@ class OwedStop:
             if owed is None:
                 return
             try:
-                with anyio.CancelScope(shield=True):
+                with anyio.CancelScope(shield=True), calling(NOBODY):
                     await self._robot.stop()
             except MapspeakError as error:
                 if not self._has_warned:

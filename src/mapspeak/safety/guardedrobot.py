@@ -64,9 +64,8 @@ class GuardedRobot:
         self._surveyor = surveyor
         self._drive: GuardedDrive | None = None
         self._verdicts: OrderedDict[str, GoalStatus] = OrderedDict()
-        self._n_stops = 0
-        self._watching = anyio.Lock()
-        self._stepping = anyio.Lock()
+        self._n_stops, self._is_stop_owed = 0, False
+        self._watching, self._stepping = anyio.Lock(), anyio.Lock()
         self._seen_at_s = -math.inf
         self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
         self.planner = Planner(robot, surveyor=surveyor, policy=guard.policy)
@@ -132,22 +131,29 @@ class GuardedRobot:
             PolicyError: The policy, a hold or a person does not allow it, or it was stopped.
         """
         n_stops = self._n_stops
+        if self._is_stop_owed:
+            await self.watch()
         plan = await self.planner.plan(goal)
+        async with self._stepping:
+            pass  # A leg that is on its way must not come after this goal.
         permit = self._guard.clear(DriveCommand(goal=goal, check=plan.check), robot_s=self.now_s)
         if n_stops != self._n_stops:
             raise self._overtaken(permit)
+        if self._drive is not None:
+            self._give_up_legs(self._drive, CauseCode.REPLACED)
         try:
             robot_goal_id = await self._robot.send_goal(plan.legs[0])
         except BaseException as error:
             # Whether the robot took the goal is unknown: it must not drive unnoticed.
+            self._is_stop_owed = True
             with anyio.CancelScope(shield=True):
                 self._guard.note_result(permit, _say_error(error), robot_s=self.now_s)
-                await self.stop()
+                await self._stop("given up")
             raise
         self._take_up(robot_goal_id, plan, permit)
         if n_stops != self._n_stops:
             with anyio.CancelScope(shield=True):
-                await self.stop()
+                await self._stop("stopped")
             raise self._overtaken(permit)
         return robot_goal_id
 
@@ -178,7 +184,10 @@ class GuardedRobot:
 
     async def stop(self) -> None:
         """End every drive and command zero velocity, at once; never refused."""
-        await self._stop("stopped")
+        try:
+            await self._stop("stopped")
+        finally:
+            self._latch()
 
     @property
     def name(self) -> str:
@@ -195,6 +204,8 @@ class GuardedRobot:
     async def watch(self) -> None:
         """Stop the robot before it enters a closed area, whatever moves it; to be called often."""
         async with self._watching:
+            if self._is_stop_owed:
+                await self._repeat_stop()
             drive = self._drive
             fault = await self._find_fault(self._mover)
             if drive is not self._drive:
@@ -220,11 +231,8 @@ class GuardedRobot:
         try:
             revision = await self.planner.survey_lately()
         except LinkError as error:
-            logger.log(
-                logging.DEBUG if drive is None else logging.WARNING,
-                "While watching the map: %s",
-                error,
-            )
+            level = logging.DEBUG if drive is None else logging.WARNING
+            logger.log(level, "While watching the map: %s", error)
             return
         if drive is None:
             return
@@ -242,7 +250,10 @@ class GuardedRobot:
 
     def _take_up(self, robot_goal_id: str, plan: Plan, permit: Permit) -> None:
         """Begin to look after a drive that the robot has accepted."""
-        self._note_replaced()
+        if self._drive is not None:
+            replaced = GoalStatus(state=GoalState.PREEMPTED, cause=Cause(code=CauseCode.REPLACED))
+            self._note_end(self._drive.goal_id, replaced)
+        self._is_stop_owed = False
         self._seen_at_s = anyio.current_time()
         first, *others = plan.legs
         self._monitor.begin_at(plan.here, now_s=self.now_s)
@@ -271,13 +282,12 @@ class GuardedRobot:
         return replace(status, distance_left_m=left_m + drive.further_m)
 
     async def _send_on(self, drive: GuardedDrive) -> None:
-        n_stops = self._n_stops
         if self._guard.hold.read() is not None:
             return
         leg = drive.legs[0]
         said = f"on to ({leg.x:.2f}, {leg.y:.2f})"
-        self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
         try:
+            self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
             # Who gives up asking how a drive stands does not give up the drive.
             with anyio.CancelScope(shield=True):
                 drive.leg_id = await self._robot.send_goal(leg)
@@ -287,9 +297,9 @@ class GuardedRobot:
             await self._end(drive, GoalState.BLOCKED, cause)
             raise
         drive.leg, drive.legs = leg, drive.legs[1:]
-        if n_stops != self._n_stops:
+        if drive.verdict is not None:
             with anyio.CancelScope(shield=True):
-                await self.stop()
+                await self._stop("given up")
 
     async def _find_fault(self, mover: Mover) -> Cause | None:
         """Return why the robot must not go on; that nothing can be seen is a reason after a while.
@@ -331,6 +341,7 @@ class GuardedRobot:
     async def _repeat_stop(self) -> None:
         self.by_hand.stand()
         await self._robot.stop()
+        self._is_stop_owed = False
 
     async def _stop(self, why: str) -> None:
         self._n_stops += 1
@@ -344,7 +355,6 @@ class GuardedRobot:
             raise
         finally:
             self._guard.note_event("stop", why, robot_s=self.now_s)
-            self._latch()
 
     def _latch(self) -> None:
         """Hold the robot after a client's stop, where the policy says so."""
@@ -375,12 +385,6 @@ class GuardedRobot:
             drive.legs = []
             status = GoalStatus(state=GoalState.CANCELLED, cause=Cause(code=code))
             drive.verdict = drive.verdict or status
-
-    def _note_replaced(self) -> None:
-        if self._drive is not None:
-            cause = Cause(code=CauseCode.REPLACED)
-            status = GoalStatus(state=GoalState.PREEMPTED, cause=cause)
-            self._note_end(self._drive.goal_id, status)
 
     def _overtaken(self, permit: Permit) -> PolicyError:
         what = say_command(permit.command)
