@@ -28,8 +28,7 @@ from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.hub import Hub, Publication, Topic
 from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem
-from mapspeak.rosbridge_server.parameters import Parameters
-from mapspeak.rosbridge_server.rosapi import add_rosapi
+from mapspeak.rosbridge_server.rosapi import Parameters, add_rosapi
 from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.server.app import build_server
 from mapspeak.server.tools.ros.goals import RosAccess

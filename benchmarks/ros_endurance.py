@@ -24,9 +24,9 @@ from mapspeak.links.rosbridge import RosbridgeClient, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
 from mapspeak.links.rosbridge.protocol.conversation import Conversation, FrameRefused, ServerEvent
 from mapspeak.robot import GoalState
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid, write_grid
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 

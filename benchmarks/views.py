@@ -33,14 +33,14 @@ from mapspeak.server.tools.explore import Covered
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world
-from mapspeak.spatial.paths import clearance_m
-from mapspeak.spatial.viewing import (
+from mapspeak.spatial.fieldofview import (
     CameraView,
     look_all_around,
     mask_pictured,
     measure_pictured,
     ray_at,
 )
+from mapspeak.spatial.paths import clearance_m
 
 __all__ = ["main", "measure"]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.look import draw_building
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.server.mapview.drawing import draw_world
+from mapspeak.server.reports.mappicture import draw_world
 from mapspeak.server.text.world.look import MapLook, view_of
 from mapspeak.server.text.world.tables import describe_world
 from mapspeak.simulator import TrueFloor, load_world

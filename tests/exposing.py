@@ -17,8 +17,7 @@ from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server.hub import Hub, Topic
 from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem
-from mapspeak.rosbridge_server.parameters import Parameters
-from mapspeak.rosbridge_server.rosapi import add_rosapi
+from mapspeak.rosbridge_server.rosapi import Parameters, add_rosapi
 from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.safety import Guard
 from mapspeak.server.app import MapspeakServer, build_server

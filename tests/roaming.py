@@ -10,7 +10,7 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, World
-from mapspeak.simulator.worlds.mapworld import build_map_world
+from mapspeak.simulator.worlds.world import build_map_world
 
 CELL_M = 0.25
 

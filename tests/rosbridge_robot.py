@@ -10,10 +10,10 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor
 from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, running

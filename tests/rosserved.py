@@ -13,8 +13,8 @@ from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.memory import SemanticMapStore
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Guard

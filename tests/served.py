@@ -14,7 +14,7 @@ from mapspeak.memory import MemoryStore, SemanticMapStore
 from mapspeak.robot import Robot
 from mapspeak.safety import Guard
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.reports.representations import Representation
 from mapspeak.server.wire.calllog import CallLog
 from mapspeak.session import Session
 

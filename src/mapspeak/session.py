@@ -15,8 +15,8 @@ import anyio.to_thread
 from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.episodewriter import EpisodeWriter, Keeping
-from mapspeak.driving.exploration.tried import FrontierTries
-from mapspeak.driving.stops import Lease
+from mapspeak.driving.exploration.blocked import FrontierTries
+from mapspeak.driving.lease import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore, PictureBook, SemanticMap
@@ -34,7 +34,7 @@ from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
 from mapspeak.ros.port import RosConnection, started_over
-from mapspeak.safety import Guard, GuardedRobot, Surveyor, WhenBusy, guard_connection
+from mapspeak.safety import Guard, GuardedRobot, MapReviser, WhenBusy, guard_connection
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel, revise
@@ -84,25 +84,25 @@ class Session:
         find_model: Callable[[], Embedder | None] = find_model,
     ) -> None:
         self.guard = guard
-        self._surveyor: Surveyor | None = None
+        self._reviser: MapReviser | None = None
         self._guarded: GuardedRobot | None = None
         when_busy = WhenBusy.REPLACE
         if guard is not None:
-            self._surveyor = Surveyor(
+            self._reviser = MapReviser(
                 guard.policy.areas,
                 wall_clock=guard.wall_clock,
                 read_events=self.recall_events,
                 # A configured clearance is kept to the millimetre.
                 leaves_pockets=not guard.policy.clearance_m,
             )
-            self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
+            self._guarded = GuardedRobot(robot, guard=guard, reviser=self._reviser)
             when_busy = guard.policy.when_busy
             if ros is not None:
                 ros = guard_connection(
                     ros,
                     guard=guard,
                     now_s=lambda: robot.now_s,
-                    by_hand=self._guarded.by_hand,
+                    teleop=self._guarded.teleop,
                     planner=self._guarded.planner,
                 )
         self.ros, self.skilled = ros, skilled
@@ -119,7 +119,7 @@ class Session:
         self.keeper, self._lease = self.memory.keeper, Lease(lease_s)
         self.world: WorldModel | None = None
         self._tries, self._looked_s, self._learned_from = FrontierTries(), 0.0, ""
-        self._ranking, self._surveying = threading.Lock(), anyio.Lock()
+        self._ranking, self._revising = threading.Lock(), anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
         """Mark a client's call: its lease begins anew."""
@@ -155,7 +155,7 @@ class Session:
             LinkError: The robot has no map yet.
             SemanticMapError: The memory is needed and cannot be read.
         """
-        async with self._surveying:
+        async with self._revising:
             grid = await self.robot.fetch_map()
             if not grid.cells.size:
                 raise MapError(
@@ -165,9 +165,9 @@ class Session:
             stamped = await self.robot.fetch_pose()
             recall = self._recall if needs_memory else self._recall_if_possible
             memory = await self.compute(partial(recall, grid))
-            revision, warnings = await self._survey(grid)
+            revision, warnings = await self._revise(grid)
             if await self._learn(revision):
-                revision, warnings = await self._survey(grid)
+                revision, warnings = await self._revise(grid)
             await self.compute(lambda: self._tries.learn(self.drives.ended, revision, stamped.pose))
             self.world = WorldModel(
                 grid,
@@ -290,14 +290,14 @@ class Session:
         choose = partial(choose_goal, place=place, x=x, y=y, yaw_deg=yaw_deg, as_near=as_near)
         return await self.compute(partial(choose, world))
 
-    async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision, tuple[str, ...]]:
+    async def _revise(self, grid: OccupancyGrid) -> tuple[MapRevision, tuple[str, ...]]:
         """Return the map with what is closed on it now, and what is to be said of that."""
-        surveyor, radius_m = self._surveyor, self.robot.description.radius_m
-        if surveyor is None:
+        reviser, radius_m = self._reviser, self.robot.description.radius_m
+        if reviser is None:
             return revise(grid, self.world, radius_m=radius_m), ()
-        revision = await surveyor.survey(grid, radius_m=radius_m)
+        revision = await reviser.revise(grid, radius_m=radius_m)
         others = () if self.guard is None else self.guard.warn_of_servers()
-        return revision, (*others, *await self.compute(lambda: surveyor.describe(revision)))
+        return revision, (*others, *await self.compute(lambda: reviser.describe(revision)))
 
     async def _learn(self, revision: MapRevision) -> bool:
         """Remember what the last drive tells of doors; true when that changes ways."""

@@ -30,7 +30,7 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Robot
 from mapspeak.server.app import build_server
 from mapspeak.server.view.chat import URI
-from mapspeak.server.wire.doors import listen
+from mapspeak.server.wire.access import listen
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.spatial import OccupancyGrid

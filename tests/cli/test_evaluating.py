@@ -6,11 +6,11 @@ from filelock import FileLock
 
 from mapspeak.cli.evaluating import evaluate
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.finding import agent_names
+from mapspeak.evaluation.agents.catalogue import agent_names
 from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.evaluation.tasks.catalogue import FAMILIES
 from mapspeak.evaluation.trials import read_results, trial_folder, write_result
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.reports.representations import Representation
 from reportmaking import make_result, make_trial
 
 TWO_ROOMS = """

@@ -12,7 +12,7 @@ from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import BoundKind, Bounds, ExplorationState, Progress
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.places.views.headings import face_new_walls
+from mapspeak.places.relations.viewpoints import face_new_walls
 from mapspeak.robot import GoalState
 from mapspeak.server.text.world.drives import say_progress
 from mapspeak.server.tools.sightings import look_ahead

@@ -2,7 +2,7 @@
 
 from drawing import grid_from_text
 from mapspeak.driving.drivereport import Drive
-from mapspeak.driving.exploration.tried import FrontierTries
+from mapspeak.driving.exploration.blocked import FrontierTries
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.spatial import OccupancyGrid

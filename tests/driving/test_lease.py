@@ -3,7 +3,7 @@ import math
 import anyio
 import pytest
 
-from mapspeak.driving.stops import Lease
+from mapspeak.driving.lease import Lease
 from mapspeak.errors import ConfigError
 
 pytestmark = pytest.mark.anyio

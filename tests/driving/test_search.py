@@ -14,11 +14,11 @@ from mapspeak.driving.search.seenfloor import SeenFloor
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.places.relations.choosing import find_place
-from mapspeak.places.views.sights import measure_shown
+from mapspeak.places.relations.viewpoints import measure_shown
 from mapspeak.robot import Detection
 from mapspeak.session import Session
 from mapspeak.simulator import World, load_world
-from mapspeak.spatial.viewing import HALF_VIEW_RAD
+from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
 from roaming import RoamingRobot, session_of
 
 pytestmark = pytest.mark.anyio

@@ -15,8 +15,8 @@ from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.patience import Patience
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.server.app import build_server
 from mapspeak.session import Session

@@ -27,12 +27,12 @@ from mapspeak.places.recall.events import (
     find_cut_off,
 )
 from mapspeak.places.relations.choosing import check_place, find_place
-from mapspeak.safety import Policy, Surveyor
+from mapspeak.safety import MapReviser, Policy
 from mapspeak.server.text.world.drives import say_progress
 from mapspeak.server.text.world.look import MapLook, view_of
 from mapspeak.server.text.world.maps import say_refusal
-from mapspeak.server.text.world.measures import describe_measures
 from mapspeak.server.text.world.tables import describe_world
+from mapspeak.server.text.world.ways import describe_measures
 from mapspeak.session import Session
 from mapspeak.spatial import UNKNOWN
 from mapspeak.spatial.frontiers import RefusalReason
@@ -154,23 +154,23 @@ async def test_an_event_closes_and_opens_again_by_itself_and_the_policy_stays() 
     clock = WallClock(NOW)
     pit = rectangle("pit", (2.0, 2.0), (3.0, 3.0))
     events = [event(Effect.CLOSED), event(Effect.NONE, text="the pit is open again", place="pit")]
-    surveyor = Surveyor([pit], wall_clock=clock, read_events=lambda: events)
+    reviser = MapReviser([pit], wall_clock=clock, read_events=lambda: events)
 
-    before = await surveyor.survey(office(), radius_m=RADIUS_M)
+    before = await reviser.revise(office(), radius_m=RADIUS_M)
     clock.now = LATER
-    after = await surveyor.survey(office(), radius_m=RADIUS_M)
+    after = await reviser.revise(office(), radius_m=RADIUS_M)
 
     assert [area.name for area in before.areas] == ["pit", "C1"]
     assert [area.name for area in after.areas] == ["pit"]
 
 
 async def test_the_revision_stays_while_events_do() -> None:
-    surveyor = Surveyor([], wall_clock=WallClock(NOW), read_events=lambda: [event(Effect.AVOID)])
+    reviser = MapReviser([], wall_clock=WallClock(NOW), read_events=lambda: [event(Effect.AVOID)])
     grid = office()
 
-    first = await surveyor.survey(grid, radius_m=RADIUS_M)
+    first = await reviser.revise(grid, radius_m=RADIUS_M)
 
-    assert await surveyor.survey(grid, radius_m=RADIUS_M) is first
+    assert await reviser.revise(grid, radius_m=RADIUS_M) is first
     assert first.hindrances
 
 

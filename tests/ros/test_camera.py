@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 from mapspeak.ros.robot.sensors import RosCamera
 from rosbridge_robot import ScriptedRobot, connect_scripted
 

@@ -10,9 +10,9 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import PoseDoubt
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.topics import name_camera
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import write_header
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
-from mapspeak.ros.patience import Patience
 from rosbridge_robot import ScriptedRobot, connect_scripted
 
 pytestmark = pytest.mark.anyio

@@ -13,10 +13,10 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.robot import RangeScan
 from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.ros.messages.scans import LaserScan, write_scan
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot.sensors import Laser
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import Operation

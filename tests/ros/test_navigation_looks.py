@@ -9,10 +9,10 @@ import pytest
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import NavigationLook, NavigationPart
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FrameTransform, write_pose, write_transforms
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot.plans import find_navigation_topics
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually

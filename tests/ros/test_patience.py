@@ -1,6 +1,6 @@
 """How long navigation and actions are waited for."""
 
-from mapspeak.ros.patience import USUAL_PATIENCE
+from mapspeak.ros.link import USUAL_PATIENCE
 
 FAST_DDS_REPEATS_S = 3.0
 """The period of its heartbeats, unless a robot's profile says otherwise."""

@@ -12,8 +12,8 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.profile import NavigationKind, PoseSource
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, write_header
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted
 from rosbridge_script import PATIENCE_S, Operation

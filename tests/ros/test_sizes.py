@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mapspeak.links.cdr import Codec
-from mapspeak.ros.definitions.sizes import measure_message
 from mapspeak.ros.definitions.texts import known_definitions
-from mapspeak.ros.definitions.types import TypeBook
+from mapspeak.ros.definitions.types import TypeBook, measure_message
 from mapspeak.ros.messages.fields import Dialect
 
 HEADER = {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "map"}

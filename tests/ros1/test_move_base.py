@@ -9,7 +9,7 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 from ros2.robot_process import RobotProcess
 
 pytestmark = [pytest.mark.ros1, pytest.mark.anyio]

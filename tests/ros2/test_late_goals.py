@@ -12,7 +12,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rclpy import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.robot import GoalState
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 from mapspeak.ros.robot import RosRobot
 from ros2.robot_process import RobotProcess
 

@@ -9,7 +9,7 @@ from fakes import FakeRobot
 from guarding import audit_of, corners, make_guard, rectangle
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState
-from mapspeak.safety import AreaRule, GuardedRobot, Policy, Surveyor
+from mapspeak.safety import AreaRule, GuardedRobot, MapReviser, Policy
 from mapspeak.safety.monitor import KEEP_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.keepout import ClosedArea
@@ -74,7 +74,9 @@ async def test_a_robot_that_ends_each_leg_early_still_gets_round_and_keeps_off(
     rule, start, goal, wall_m = CASES[case]
     fake = ContentRobot(hall(wall_from_m=wall_m), pose=start)
     guard = make_guard(tmp_path, Policy(areas=(rule,)))
-    robot = GuardedRobot(fake, guard=guard, surveyor=Surveyor((rule,), wall_clock=guard.wall_clock))
+    robot = GuardedRobot(
+        fake, guard=guard, reviser=MapReviser((rule,), wall_clock=guard.wall_clock)
+    )
     area = ClosedArea(name="", outline=rule.outline)
     goal_id = await robot.send_goal(goal)
     nearest_m = 99.0

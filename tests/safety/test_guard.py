@@ -9,7 +9,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import WallClock, make_guard, rectangle
 from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.events import Effect, Event
-from mapspeak.safety import AreaRule, CommandKind, Policy, Surveyor
+from mapspeak.safety import AreaRule, CommandKind, MapReviser, Policy
 from mapspeak.safety.guard import RateLog
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
@@ -37,27 +37,27 @@ async def test_a_rule_that_closes_nothing_is_told_before_anybody_drives_or_looks
 
 
 async def test_a_map_is_surveyed_once_until_it_or_the_robots_width_changes() -> None:
-    surveyor = Surveyor((), wall_clock=WallClock())
-    first = await surveyor.survey(two_rooms(), radius_m=0.2)
+    reviser = MapReviser((), wall_clock=WallClock())
+    first = await reviser.revise(two_rooms(), radius_m=0.2)
     grid = first.grid
-    assert await surveyor.survey(grid, radius_m=0.2) is first
-    assert surveyor.latest is first
-    wider = await surveyor.survey(grid, radius_m=0.3)
+    assert await reviser.revise(grid, radius_m=0.2) is first
+    assert reviser.latest is first
+    wider = await reviser.revise(grid, radius_m=0.3)
     assert (wider is first, wider.radius_m) == (False, 0.3)
     closed = OccupancyGrid(
         cells=np.full_like(grid.cells, 100),
         resolution_m=grid.resolution_m,
         origin=grid.origin,
     )
-    assert (await surveyor.survey(closed, radius_m=0.3)).grid is closed
+    assert (await reviser.revise(closed, radius_m=0.3)).grid is closed
 
 
 @pytest.mark.parametrize(("effect", "closes"), [(Effect.CLOSED, True), (Effect.SLOW, False)])
 def test_an_event_that_closes_a_place_is_as_good_as_a_rule(effect: Effect, *, closes: bool) -> None:
     events = [Event(text="wet paint", place="corridor", effect=effect)]
-    surveyor = Surveyor((), wall_clock=WallClock(), read_events=lambda: events)
-    assert surveyor.has_rules == closes
-    assert not Surveyor((), wall_clock=WallClock()).has_rules
+    reviser = MapReviser((), wall_clock=WallClock(), read_events=lambda: events)
+    assert reviser.has_rules == closes
+    assert not MapReviser((), wall_clock=WallClock()).has_rules
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,9 @@ from mapspeak.safety import (
     CommandKind,
     GuardedRobot,
     Hours,
+    MapReviser,
     Otherwise,
     Policy,
-    Surveyor,
     calling,
 )
 from mapspeak.safety.monitor import KEEP_M
@@ -57,8 +57,8 @@ def guarded(
     robot: FakeRobot, folder: Path, policy: Policy | None = None, clock: WallClock | None = None
 ) -> GuardedRobot:
     guard = make_guard(folder, policy, clock=clock)
-    surveyor = Surveyor(guard.policy.areas, wall_clock=guard.wall_clock)
-    return GuardedRobot(robot, guard=guard, surveyor=surveyor)
+    reviser = MapReviser(guard.policy.areas, wall_clock=guard.wall_clock)
+    return GuardedRobot(robot, guard=guard, reviser=reviser)
 
 
 async def refusal_of(robot: GuardedRobot, goal: Pose) -> str:
@@ -444,8 +444,8 @@ async def test_a_hold_stops_a_robot_that_drives_by_other_means_too(tmp_path: Pat
 async def test_a_held_robot_that_moves_again_is_stopped_again(tmp_path: Path) -> None:
     fake = FakeRobot(two_rooms())
     guard = make_guard(tmp_path)
-    surveyor = Surveyor((), wall_clock=guard.wall_clock)
-    robot = GuardedRobot(fake, guard=guard, surveyor=surveyor, repeat_s=0.0)
+    reviser = MapReviser((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(fake, guard=guard, reviser=reviser, repeat_s=0.0)
     guard.hold.put("by hand", at=guard.wall_clock())
     for _ in range(3):
         await robot.obey_hold()
@@ -466,8 +466,8 @@ async def test_a_held_robot_whose_pose_is_not_known_is_stopped_again_and_again(
     fake = BlindRobot(two_rooms())
     fake.is_blind = True
     guard = make_guard(tmp_path)
-    surveyor = Surveyor((), wall_clock=guard.wall_clock)
-    robot = GuardedRobot(fake, guard=guard, surveyor=surveyor, repeat_s=0.0)
+    reviser = MapReviser((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(fake, guard=guard, reviser=reviser, repeat_s=0.0)
     guard.hold.put("by hand", at=guard.wall_clock())
     for _ in range(4):
         await robot.obey_hold()
@@ -481,8 +481,8 @@ async def test_stops_of_a_held_robot_are_repeated_no_faster_than_said(tmp_path: 
     fake = BlindRobot(two_rooms())
     fake.is_blind = True
     guard = make_guard(tmp_path)
-    surveyor = Surveyor((), wall_clock=guard.wall_clock)
-    robot = GuardedRobot(fake, guard=guard, surveyor=surveyor, repeat_s=3600.0)
+    reviser = MapReviser((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(fake, guard=guard, reviser=reviser, repeat_s=3600.0)
     guard.hold.put("by hand", at=guard.wall_clock())
     for _ in range(20):
         await robot.obey_hold()

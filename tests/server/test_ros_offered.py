@@ -11,7 +11,7 @@ from mcp_types import Tool
 from fakes import FakeRobot, two_rooms
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.reports.representations import Representation
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 

@@ -14,8 +14,8 @@ from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from guarding import MONDAY_NOON, make_guard
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.patience import Patience
 from mapspeak.safety import CommandKind, Guard, Patterns, Policy
 from mapspeak.server.app import build_server
 from mapspeak.session import Session

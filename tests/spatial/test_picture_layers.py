@@ -26,7 +26,7 @@ from mapspeak.spatial.picture.marks import (
     PALETTE,
     FillPart,
 )
-from mapspeak.spatial.picture.view import even_spacing_m
+from mapspeak.spatial.picture.transform import even_spacing_m
 from seeing import (
     FREE_RGB,
     WALL_RGB,

@@ -129,7 +129,7 @@ def evaluate(*, folder: Path, is_quiet: bool, is_report_only: bool, **chosen: An
     every trial came to a result, whatever the result is; 1 when one crashed or hung; 2 when
     something that was asked for does not exist; 130 after Ctrl-C.
     """
-    from mapspeak.evaluation.agents.finding import check_agent  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.evaluation.agents.catalogue import check_agent  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.evaluation.runs.plan import RunOptions  # noqa: PLC0415
 
     if is_report_only:

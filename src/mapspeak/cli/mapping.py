@@ -124,7 +124,7 @@ def _content(
     # Each form is imported when it is wanted, so that a map is described at once.
     match output:
         case Output.PICTURE:
-            from mapspeak.server.mapview.drawing import draw_rooms  # noqa: PLC0415
+            from mapspeak.server.reports.mappicture import draw_rooms  # noqa: PLC0415
 
             return draw_rooms(rooms).png
         case Output.LABELS:

@@ -15,9 +15,8 @@ from dataclasses import replace
 
 import anyio
 
-from mapspeak.driving.drivemonitor import DriveMonitor, Look
+from mapspeak.driving.drivemonitor import NEEDS_NO_STOP, DriveMonitor, Look, OwedStop
 from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_failed
-from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose

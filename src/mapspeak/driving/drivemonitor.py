@@ -1,18 +1,22 @@
-"""Looking at a robot that drives: how its drive stands, and signs that it is over untold."""
+"""Watching a robot that drives: how its drive stands, signs that it is over, a stop still owed."""
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+
+import anyio
 
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
+from mapspeak.safety import NOBODY, calling
 
 MOVED_M = 0.1
 TURNED_RAD = math.radians(10)
 JUMP_M = 1.0
-FASTEST_MPS = 3.0
+FASTEST_DRIVE_MPS = 3.0
 """No indoor robot drives faster; what the pose moves beyond this and a slack is a jump."""
 SILENT_FOR_S = 10.0
 """Wall time without state or pose after which a drive counts as lost."""
@@ -43,7 +47,7 @@ class Odometer:
             self._counted = here.pose
             return None
         moved_m = before.pose.point.distance_to(here.pose.point)
-        if moved_m > JUMP_M + FASTEST_MPS * (here.stamp_s - before.stamp_s):
+        if moved_m > JUMP_M + FASTEST_DRIVE_MPS * (here.stamp_s - before.stamp_s):
             self._counted = here.pose
             return moved_m
         step_m = self._counted.point.distance_to(here.pose.point)
@@ -204,3 +208,80 @@ class DriveMonitor:
 def _has_moved(one: Pose, other: Pose) -> bool:
     turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
     return one.point.distance_to(other.point) > MOVED_M or turned_rad > TURNED_RAD
+
+
+NEWS_S = 0.5
+"""Wall time from the robot's return until its navigation has told how goals stand."""
+NEEDS_NO_STOP = (GoalState.ARRIVED, GoalState.CANCELLED, GoalState.PREEMPTED)
+"""Navigation has ended these itself; what a newer goal has replaced, that drives on with."""
+
+logger = logging.getLogger(__name__)
+
+
+class OwedStop:
+    """The stop that is owed to one robot, if any.
+
+    Attributes:
+        goal_id: Of the drive it is owed for; None where nothing is owed.
+    """
+
+    def __init__(self, robot: Robot, *, wall_s: Callable[[], float]) -> None:
+        self._robot = robot
+        self._wall_s = wall_s
+        self._stopping = anyio.Lock()
+        self._answered_s: float | None = None
+        self._has_warned = False
+        self.goal_id: str | None = None
+
+    def owe(self, goal_id: str) -> None:
+        """Note that a drive has to be stopped."""
+        self.goal_id, self._answered_s, self._has_warned = goal_id, None, False
+
+    def forgive(self) -> None:
+        """Note that nothing has to be stopped any more."""
+        self.goal_id = None
+
+    async def wait_for_stop(self) -> None:
+        """Return when no stop is being sent: it would end what is sent meanwhile."""
+        async with self._stopping:
+            return
+
+    async def stop(self) -> None:
+        """Stop the robot where that is owed; what fails stays owed."""
+        async with self._stopping:
+            owed = self.goal_id
+            if owed is None:
+                return
+            try:
+                with anyio.CancelScope(shield=True), calling(NOBODY):
+                    await self._robot.stop()
+            except MapspeakError as error:
+                if not self._has_warned:
+                    logger.warning("%s could not be stopped yet: %s", owed, error)
+                self._has_warned = True
+                return
+            if self.goal_id == owed:
+                self.forgive()
+
+    async def settle(self, drive: Drive) -> GoalStatus | None:
+        """Stop the drive a stop is owed for, unless it has ended by itself; return how it has.
+
+        A robot that is back needs a moment to tell how its goals stand.
+        """
+        try:
+            truth = await self._robot.fetch_goal_status(drive.robot_goal_id or "")
+        except LinkError:
+            # Out of reach, or only its state is: then it can be stopped.
+            self._answered_s = None
+            await self.stop()
+            return None
+        if self.goal_id != drive.goal_id:
+            return None
+        if truth.state in NEEDS_NO_STOP:
+            self.forgive()
+            return truth
+        now_s = self._wall_s()
+        self._answered_s = now_s if self._answered_s is None else self._answered_s
+        if truth.state.is_final or now_s - self._answered_s >= NEWS_S:
+            await self.stop()
+        return None

@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from mapspeak.evaluation.inspected.playing import InspectedSystem
+from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.geometry import Pose
 from mapspeak.simulator import WorldObject
 

@@ -26,7 +26,7 @@ from mapspeak.links.endpoints import (
 )
 from mapspeak.links.goals import ActionWire, ServiceClient
 from mapspeak.ros.activity import ActionGoal, Subscription
-from mapspeak.ros.link import wrong_type
+from mapspeak.ros.link import Patience, wrong_type
 from mapspeak.ros.messages.fields import (
     BULKY,
     Dialect,
@@ -35,7 +35,6 @@ from mapspeak.ros.messages.fields import (
     check_name,
     check_type,
 )
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import RosConnection, RosGraph, TopicQuality
 
 QoS = Any  # a quality of service in each link's own terms

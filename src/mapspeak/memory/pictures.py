@@ -9,7 +9,7 @@ from datetime import datetime
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import LaserRing
-from mapspeak.spatial.viewing import HALF_VIEW_RAD, CameraView, find_half_view_rad
+from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, CameraView, find_half_view_rad
 
 MOST_PICTURES = 500
 """Number of pictures that can be referred to; older ones are forgotten here, kept or not."""

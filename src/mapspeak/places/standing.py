@@ -10,9 +10,9 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.memory.things.approach import OVERLOOK_M, find_overlook
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
+from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
-from mapspeak.spatial.viewing import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
 from mapspeak.worldmodel.model import WorldModel, find_crossing
 from mapspeak.worldmodel.remembered import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision

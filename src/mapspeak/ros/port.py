@@ -15,10 +15,9 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
-from mapspeak.ros.link import Advertising, plain_errors, say_again
+from mapspeak.ros.link import Advertising, Patience, plain_errors, say_again
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.parameters import ParameterServices
-from mapspeak.ros.patience import Patience
 
 
 def new_id() -> str:

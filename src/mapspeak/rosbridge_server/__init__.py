@@ -6,8 +6,7 @@ no robot behind it: topics, services, types and parameters, served by `serve_sys
 
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub, Topic
 from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem
-from mapspeak.rosbridge_server.parameters import Parameters, add_parameter_services
-from mapspeak.rosbridge_server.rosapi import add_rosapi
+from mapspeak.rosbridge_server.rosapi import Parameters, add_parameter_services, add_rosapi
 from mapspeak.rosbridge_server.serving import (
     RosbridgeServer,
     open_rosbridge_server,

@@ -16,8 +16,7 @@ from mapspeak.ros.messages.poses import FramedPose, read_twist
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub, Publication, Topic
 from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem, Values
 from mapspeak.rosbridge_server.navigation import ACTION, BASE_FRAME, Drives, MoveBase, Nav2
-from mapspeak.rosbridge_server.parameters import Parameters, add_parameter_services
-from mapspeak.rosbridge_server.rosapi import add_rosapi
+from mapspeak.rosbridge_server.rosapi import Parameters, add_parameter_services, add_rosapi
 from mapspeak.rosbridge_server.skillservices import (
     BATTERY_TOPIC,
     BATTERY_TYPE,

@@ -37,7 +37,7 @@ from mapspeak.safety.deciding import (
     Situation,
     decide,
 )
-from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit, Surveyor
+from mapspeak.safety.guard import ApprovalNeededError, Guard, MapReviser, Permit
 from mapspeak.safety.guardedrobot import GuardedRobot
 from mapspeak.safety.policy import (
     Approval,
@@ -50,7 +50,7 @@ from mapspeak.safety.policy import (
     WhenBusy,
 )
 from mapspeak.safety.policyfile import load_policy
-from mapspeak.safety.velocities import HandDriving, publishing_for, zero_velocity_of
+from mapspeak.safety.teleop import Teleop, publishing_for, zero_velocity_of
 
 __all__ = [
     "NOBODY",
@@ -72,9 +72,9 @@ __all__ = [
     "Guard",
     "GuardedConnection",
     "GuardedRobot",
-    "HandDriving",
     "Hold",
     "Hours",
+    "MapReviser",
     "NeedsApproval",
     "Otherwise",
     "Patterns",
@@ -86,7 +86,7 @@ __all__ = [
     "SetParameter",
     "Situation",
     "Speeds",
-    "Surveyor",
+    "Teleop",
     "WaitingRoom",
     "WhenBusy",
     "calling",

@@ -20,8 +20,8 @@ from mapspeak.safety.commands import (
 from mapspeak.safety.deciding import Refused, find_speeds, is_name_denied
 from mapspeak.safety.guard import Guard
 from mapspeak.safety.planning import Planner
-from mapspeak.safety.velocities import (
-    HandDriving,
+from mapspeak.safety.teleop import (
+    Teleop,
     is_zero_velocity,
     refuse_velocity,
     zero_velocity_of,
@@ -48,7 +48,7 @@ class GuardedConnection:
     """A `RosConnection` that changes only what its policy allows; stopping always passes.
 
     Args:
-        by_hand: Knows where velocities would take the robot; None where nothing is closed.
+        teleop: Knows where velocities would take the robot; None where nothing is closed.
         planner: Checks the poses of goals against the map; None for no check.
     """
 
@@ -58,12 +58,12 @@ class GuardedConnection:
         *,
         guard: Guard,
         now_s: Callable[[], float],
-        by_hand: HandDriving | None = None,
+        teleop: Teleop | None = None,
         planner: Planner | None = None,
     ) -> None:
         self._planner = planner
         self._connection = connection
-        self._by_hand = by_hand
+        self._teleop = teleop
         self._guard = guard
         self._now_s = now_s
         self._types: dict[str, str] = {}
@@ -85,7 +85,7 @@ class GuardedConnection:
         if goal is not None:
             await self._send(goal, self._connection.publish(topic, message))
             return
-        objection = await self._by_hand.find_objection(message) if self._by_hand else None
+        objection = await self._teleop.find_objection(message) if self._teleop else None
         done = self._connection.publish(topic, message)
         # From before it is sent: what fails half-way may move the robot all the same.
         self._watch_over(command, objection)
@@ -190,17 +190,17 @@ class GuardedConnection:
     def _watch_over(self, command: Publish, objection: Refused | None) -> None:
         """Let the robot be watched that is about to be driven by a velocity."""
         is_velocity = _is_velocity(command.type)
-        if self._by_hand is None or objection is not None or not is_velocity:
+        if self._teleop is None or objection is not None or not is_velocity:
             return
         zero = zero_velocity_of(command.message)
-        self._by_hand.begin(
+        self._teleop.begin(
             command.topic,
             publish_zero=lambda: self._connection.publish_everywhere(command.topic, zero),
         )
 
     def _objection_unseen(self, command: Publish) -> Refused | None:
         """Return the objection to a velocity when there is no time to fetch the pose."""
-        is_free = self._by_hand is None or not self._by_hand.knows_areas
+        is_free = self._teleop is None or not self._teleop.knows_areas
         if is_free or not any(find_speeds(command.message)):
             return None
         return refuse_velocity("A velocity goes out by all ways at once only when it is zero.")
@@ -223,8 +223,8 @@ class GuardedConnection:
         return result
 
     def _note_stop(self, command: Publish | Call) -> None:
-        if self._by_hand is not None and isinstance(command, Publish):
-            self._by_hand.end(command.topic)
+        if self._teleop is not None and isinstance(command, Publish):
+            self._teleop.end(command.topic)
         name = command.service if isinstance(command, Call) else command.topic
         said = f"zero velocity, or the end of a goal, on {name}"
         self._guard.note_event("stop", said, robot_s=self._now_s())
@@ -261,12 +261,12 @@ def guard_connection(
     *,
     guard: Guard,
     now_s: Callable[[], float],
-    by_hand: HandDriving,
+    teleop: Teleop,
     planner: Planner,
 ) -> RosConnection:
     """Return a connection behind the guard, whose other members are passed on by name."""
     guarded = GuardedConnection(
-        connection, guard=guard, now_s=now_s, by_hand=by_hand, planner=planner
+        connection, guard=guard, now_s=now_s, teleop=teleop, planner=planner
     )
     return cast("RosConnection", guarded)
 

@@ -38,7 +38,7 @@ from mapspeak.worldmodel.revision import MapRevision
 logger = logging.getLogger(__name__)
 
 
-class Surveyor:
+class MapReviser:
     """Makes the revisions of a robot's map.
 
     Args:
@@ -76,10 +76,10 @@ class Surveyor:
         """The revision that was made last; its areas are those that were closed then."""
         return self._latest
 
-    async def survey(self, grid: OccupancyGrid, *, radius_m: float) -> MapRevision:
+    async def revise(self, grid: OccupancyGrid, *, radius_m: float) -> MapRevision:
         """Return the revision of a map: the same one while map and closed areas are the same."""
         async with self._turn:
-            self._latest = await anyio.to_thread.run_sync(self._survey, grid, radius_m)
+            self._latest = await anyio.to_thread.run_sync(self._revise, grid, radius_m)
             return self._latest
 
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
@@ -100,7 +100,7 @@ class Surveyor:
             if rule.outline and _is_off(rule, revision.grid):
                 yield f"The policy's area {rule.name!r} lies off this map: it closes nothing here."
 
-    def _survey(self, grid: OccupancyGrid, radius_m: float) -> MapRevision:
+    def _revise(self, grid: OccupancyGrid, radius_m: float) -> MapRevision:
         before = self._latest
         if before is not None and before.radius_m == radius_m and before.is_of(grid):
             revision = before

@@ -25,10 +25,10 @@ from mapspeak.robot import (
 )
 from mapspeak.safety.audit import NOBODY, current_caller
 from mapspeak.safety.commands import DriveCommand, say_command
-from mapspeak.safety.guard import Guard, Permit, Surveyor
+from mapspeak.safety.guard import Guard, MapReviser, Permit
 from mapspeak.safety.monitor import GoalMonitor, HoldKeeper, KeepOutMonitor, Mover, StandingCheck
 from mapspeak.safety.planning import GuardedDrive, Plan, Planner
-from mapspeak.safety.velocities import HandDriving
+from mapspeak.safety.teleop import Teleop
 from mapspeak.spatial import OccupancyGrid
 
 WATCH_S = 0.1
@@ -56,20 +56,20 @@ class GuardedRobot:
         robot: Robot,
         *,
         guard: Guard,
-        surveyor: Surveyor,
+        reviser: MapReviser,
         repeat_s: float = REPEAT_S,
     ) -> None:
         self._robot = robot
         self._guard = guard
-        self._surveyor = surveyor
+        self._reviser = reviser
         self._drive: GuardedDrive | None = None
         self._verdicts: OrderedDict[str, GoalStatus] = OrderedDict()
         self._n_stops, self._is_stop_owed = 0, False
         self._watching, self._stepping = anyio.Lock(), anyio.Lock()
         self._seen_at_s = -math.inf
         self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
-        self.planner = Planner(robot, surveyor=surveyor, policy=guard.policy)
-        self.by_hand = HandDriving(robot, planner=self.planner, surveyor=surveyor)
+        self.planner = Planner(robot, reviser=reviser, policy=guard.policy)
+        self.teleop = Teleop(robot, planner=self.planner, reviser=reviser)
         self._monitor = KeepOutMonitor()
 
     @property
@@ -94,7 +94,7 @@ class GuardedRobot:
 
     @property
     def _is_watched(self) -> bool:
-        return self._drive is not None or self.by_hand.is_under_way or self._surveyor.has_rules
+        return self._drive is not None or self.teleop.is_under_way or self._reviser.has_rules
 
     async def fetch_map(self) -> OccupancyGrid:
         """Return the latest map."""
@@ -226,10 +226,10 @@ class GuardedRobot:
         A map may take long to come and to be looked through: `watch` must not wait for it.
         """
         drive = self._drive
-        if drive is None and not self._surveyor.has_rules:
+        if drive is None and not self._reviser.has_rules:
             return
         try:
-            revision = await self.planner.survey_lately()
+            revision = await self.planner.revise_lately()
         except LinkError as error:
             level = logging.DEBUG if drive is None else logging.WARNING
             logger.log(level, "While watching the map: %s", error)
@@ -246,7 +246,7 @@ class GuardedRobot:
     def _mover(self) -> Mover:
         if self._drive is not None:
             return Mover.NAVIGATION
-        return Mover.VELOCITY if self.by_hand.is_under_way else Mover.OTHERS
+        return Mover.VELOCITY if self.teleop.is_under_way else Mover.OTHERS
 
     def _take_up(self, robot_goal_id: str, plan: Plan, permit: Permit) -> None:
         """Begin to look after a drive that the robot has accepted."""
@@ -306,7 +306,7 @@ class GuardedRobot:
 
         The blind robot is stopped on a drive of ours only: what others do with it is not known.
         """
-        revision = self._surveyor.latest
+        revision = self._reviser.latest
         if revision is None or not revision.areas:
             return None
         try:
@@ -339,7 +339,7 @@ class GuardedRobot:
         await self._end(self._drive, GoalState.CANCELLED, cause)
 
     async def _repeat_stop(self) -> None:
-        self.by_hand.stand()
+        self.teleop.stand()
         await self._robot.stop()
         self._is_stop_owed = False
 

@@ -25,7 +25,7 @@ WAVER_M = 0.01
 LEAST_STEP_S = 0.05
 LOST_TRACK_S = 2.0
 """An older pose says nothing about how fast the robot drives now."""
-FASTEST_MPS = 5.0
+CORRECTED_MPS = 5.0
 """A faster movement was not driven: localisation has corrected itself."""
 N_STEPS = 8
 """The number of points on the braking path at which the distance to areas is checked."""
@@ -120,7 +120,7 @@ class KeepOutMonitor:
         if passed_s > LOST_TRACK_S or moved_m <= WAVER_M:
             return ()
         speed_mps = moved_m / passed_s
-        if speed_mps > FASTEST_MPS:
+        if speed_mps > CORRECTED_MPS:
             return ()
         # The next look is as far away as the last one was.
         further_m = speed_mps * (passed_s + REACTION_S + speed_mps / (2 * BRAKING_MPS2))

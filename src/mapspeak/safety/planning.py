@@ -13,7 +13,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
 from mapspeak.robot import GoalStatus, Robot
 from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, read_number, refuse
-from mapspeak.safety.guard import Permit, Surveyor
+from mapspeak.safety.guard import MapReviser, Permit
 from mapspeak.safety.monitor import KEEP_M, GoalMonitor
 from mapspeak.safety.policy import Policy
 from mapspeak.spatial import OccupancyGrid
@@ -193,29 +193,29 @@ class Plan:
 class Planner:
     """Checks goals against the map, and plans the legs to them."""
 
-    def __init__(self, robot: Robot, *, surveyor: Surveyor, policy: Policy) -> None:
+    def __init__(self, robot: Robot, *, reviser: MapReviser, policy: Policy) -> None:
         self._robot = robot
-        self._surveyor = surveyor
+        self._reviser = reviser
         self._policy = policy
-        self._surveyed_s = -math.inf
+        self._revised_s = -math.inf
 
     @property
     def radius_m(self) -> float:
         """The robot's radius with the clearance that the policy wants."""
         return self._robot.description.radius_m + self._policy.clearance_m
 
-    async def survey_lately(self) -> MapRevision:
+    async def revise_lately(self) -> MapRevision:
         """Return the map of a second of robot time ago at most, or of now."""
-        since_s = self._robot.now_s - self._surveyed_s
-        if self._surveyor.latest is None or not 0 <= since_s < SURVEY_EVERY_S:
-            self._surveyed_s = self._robot.now_s
-            return await self.survey()
-        return self._surveyor.latest
+        since_s = self._robot.now_s - self._revised_s
+        if self._reviser.latest is None or not 0 <= since_s < SURVEY_EVERY_S:
+            self._revised_s = self._robot.now_s
+            return await self.revise()
+        return self._reviser.latest
 
-    async def survey(self) -> MapRevision:
+    async def revise(self) -> MapRevision:
         """Return the map of now with the areas that are closed now."""
         grid = await self._robot.fetch_map()
-        return await self._surveyor.survey(grid, radius_m=self.radius_m)
+        return await self._reviser.revise(grid, radius_m=self.radius_m)
 
     async def plan(self, goal: Pose) -> Plan:
         """Check a goal, and find the legs by which the robot would get there."""
@@ -237,7 +237,7 @@ class Planner:
             return None
         map_frame = self._robot.description.map_frame
         strange = next((frame for frame, _ in poses if frame not in ("", map_frame)), None)
-        if strange is not None and self._surveyor.has_rules:
+        if strange is not None and self._reviser.has_rules:
             return _refuse_frame(strange, map_frame)
         goals = [pose for frame, pose in poses if frame in ("", map_frame)]
         if len(goals) > MOST_POSES:
@@ -255,7 +255,7 @@ class Planner:
 
     async def _look(self) -> tuple[MapRevision, Pose]:
         here = (await self._robot.fetch_pose()).pose
-        return await self.survey(), here
+        return await self.revise(), here
 
 
 def _check(revision: MapRevision, here: Pose, goal: Pose) -> GoalCheck:

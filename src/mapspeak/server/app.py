@@ -26,10 +26,8 @@ from mapspeak import __version__
 from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
-from mapspeak.server.listening import ListHearers
-from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.prompts import add_prompts
 from mapspeak.server.remarks import Remarks
+from mapspeak.server.reports.representations import Representation
 from mapspeak.server.text.offered import offering, say_error, write_instructions
 from mapspeak.server.text.wording import shorten_report, show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking, client_of
@@ -38,7 +36,13 @@ from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
-from mapspeak.server.toolsets import STOP, build_toolsets, choose_tools
+from mapspeak.server.toolsets import (
+    STOP,
+    ToolListSubscribers,
+    add_prompts,
+    build_toolsets,
+    choose_tools,
+)
 from mapspeak.server.view.chat import VIEW_MAP, ChatView, make_apps, offer_page
 from mapspeak.server.wire.calllog import CallNoting
 from mapspeak.session import Session
@@ -64,7 +68,7 @@ class MapspeakServer(MCPServer[Any]):
     Attributes:
         book: Of all its skills.
         skills: The tools that come and go.
-        hearers: The clients to notify of these changes.
+        subscribers: The clients to notify of these changes.
         exposure: Looks for those that the robot offers; None without patterns.
     """
 
@@ -92,7 +96,7 @@ class MapspeakServer(MCPServer[Any]):
         self._offered: dict[str, Tool] = {}
         self._remarks = Remarks(session)
         self.skills = SkillBoard(runs, others=lambda: self._offered)
-        self.hearers = ListHearers(self)
+        self.subscribers = ToolListSubscribers(self)
         self.exposure: Exposure | None = None
 
     @property
@@ -102,7 +106,7 @@ class MapspeakServer(MCPServer[Any]):
 
     def expose(self, ros: RosAccess, patterns: tuple[str, ...]) -> None:
         """Look for interfaces of the robot with some names, once `keep_skills` runs."""
-        self.exposure = Exposure(ros, self.skills, patterns, tell=self.hearers.tell)
+        self.exposure = Exposure(ros, self.skills, patterns, tell=self.subscribers.tell)
 
     async def keep_skills(self) -> None:
         """Let skills run, and look for those that the robot offers, until cancelled."""
@@ -247,7 +251,7 @@ class MapspeakServer(MCPServer[Any]):
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
     ) -> ListToolsResult:
-        self.hearers.note(ctx)
+        self.subscribers.note(ctx)
         return offer_page(await super()._handle_list_tools(ctx, params), ctx)
 
     async def list_tools(self) -> list[ListedTool]:

@@ -22,9 +22,7 @@ from mcp_types import Tool as ListedTool
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
 from mapspeak.server.app import MapspeakServer
-from mapspeak.server.listening import ListHearers
-from mapspeak.server.prompts import add_prompts
-from mapspeak.server.toolsets import STOP
+from mapspeak.server.toolsets import STOP, ToolListSubscribers, add_prompts
 from mapspeak.server.view.chat import make_apps, offer_page
 
 ARGUMENT = "robot"
@@ -56,15 +54,15 @@ class FleetServer(MCPServer[Any]):
             extensions=[make_apps()],
         )
         self._servers = dict(servers)
-        self._hearers = ListHearers(self)
+        self._subscribers = ToolListSubscribers(self)
         for server in servers.values():
-            server.hearers.pass_on(self._hearers.tell)
+            server.subscribers.pass_on(self._subscribers.tell)
         add_prompts(self)
 
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
     ) -> ListToolsResult:
-        self._hearers.note(ctx)
+        self._subscribers.note(ctx)
         listed = await super()._handle_list_tools(ctx, params)
         return offer_page(listed, ctx, robots=list(self._servers))
 

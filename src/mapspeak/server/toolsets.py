@@ -1,16 +1,28 @@
-"""Every toolset by its name, and the tools that are chosen of them."""
+"""What a server offers: toolsets, the tools chosen of them, prompts, and who hears of changes.
 
-from collections.abc import Iterable, Mapping, Sequence
+The exploration prompt is the paper's appendix word for word. The paper describes its semantic
+filtering policy without quoting it; the three categories are in the paper's words, and what is
+left out is said by `mapspeak.memory`, which holds every record to it.
+"""
+
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from functools import partial
+from importlib import resources
+from typing import Any
+
+from mcp.server import MCPServer, NotificationOptions, ServerRequestContext
+from mcp.server.connection import Connection
+from mcp.server.subscriptions import ToolsListChanged
 
 from mapspeak.errors import ConfigError
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.memory import LEFT_OUT
+from mapspeak.server.reports.representations import Representation
 from mapspeak.server.tools.drive import DriveTools, ViewTools
 from mapspeak.server.tools.explore import ExploreTools
-from mapspeak.server.tools.finding import FindTools
 from mapspeak.server.tools.look import LookTools
 from mapspeak.server.tools.memory import MemoryTools
 from mapspeak.server.tools.paper import PaperTools
-from mapspeak.server.tools.places import PlaceTools
+from mapspeak.server.tools.places import FindTools, PlaceTools
 from mapspeak.server.tools.ros.actions import ActionTools
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.measuring import MeasuringTools
@@ -107,3 +119,66 @@ def _check_names(what: str, asked: set[str], known: set[str]) -> None:
             f"There is no {what} named {', '.join(map(repr, strangers))}.",
             hint=f"Choose from {', '.join(sorted(known))}.",
         )
+
+
+class ToolListSubscribers:
+    """Every client that has asked for the list of tools.
+
+    Clients of the newer protocol listen to a stream that they open; older ones are told over their
+    connection, and only once they know that they will be.
+
+    Args:
+        server: Whose list it is.
+    """
+
+    def __init__(self, server: MCPServer[Any]) -> None:
+        self._bus = server._subscriptions  # noqa: SLF001 - what `Context.notify_tools_changed` uses
+        self._connections: set[Connection] = set()
+        self._others: list[Callable[[], Awaitable[None]]] = []
+        lowlevel = server._lowlevel_server  # noqa: SLF001 - the SDK offers no other way
+        lowlevel.create_initialization_options = partial(  # type: ignore[method-assign]
+            lowlevel.create_initialization_options, NotificationOptions(tools_changed=True)
+        )
+
+    def note(self, context: ServerRequestContext[Any]) -> None:
+        """Remember a client while it is connected."""
+        connection = context.session._connection  # noqa: SLF001 - sessions are one per request
+        if connection not in self._connections:
+            self._connections.add(connection)
+            connection.exit_stack.callback(self._connections.discard, connection)
+
+    def pass_on(self, tell: Callable[[], Awaitable[None]]) -> None:
+        """Tell others too: the list is a part of theirs."""
+        self._others.append(tell)
+
+    async def tell(self) -> None:
+        """Tell all clients that they should ask for the list again."""
+        await self._bus.publish(ToolsListChanged())
+        for connection in list(self._connections):
+            await connection.send_tool_list_changed()
+        for tell in self._others:
+            await tell()
+
+
+def read_text(name: str) -> str:
+    """Return one of the texts that come with the server, as they stand in `text/`."""
+    return (resources.files("mapspeak.server") / "text" / f"{name}.txt").read_text("utf-8").strip()
+
+
+def policy_text() -> str:
+    """Return the semantic filtering policy: what is kept, and what is left out."""
+    return "\n".join([read_text("semantic_policy"), *(f"- {line}" for line in LEFT_OUT.values())])
+
+
+def add_prompts(server: MCPServer) -> None:
+    """Register the paper's exploration prompt and its semantic filtering policy."""
+
+    @server.prompt(title="Explore and map (the paper's exploration prompt)")
+    def exploration() -> str:
+        """Explores the building waypoint by waypoint and records what is seen."""
+        return f"{read_text('exploration')}\n\n{policy_text()}"
+
+    @server.prompt(title="Semantic map policy")
+    def semantic_policy() -> str:
+        """Says which observations belong into the semantic map."""
+        return policy_text()

@@ -20,7 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from mapspeak.errors import ConfigError
 from mapspeak.server.app import MapspeakServer
 from mapspeak.server.fleet import FleetServer
-from mapspeak.server.wire.doors import (
+from mapspeak.server.wire.access import (
     HEALTH,
     HostGuard,
     ReadyServer,

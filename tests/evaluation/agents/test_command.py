@@ -10,9 +10,9 @@ import clientprogram
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agent import Assignment, ToolClient
+from mapspeak.evaluation.agents.catalogue import find_versions
 from mapspeak.evaluation.agents.command.agent import run_program
 from mapspeak.evaluation.agents.command.program import AnswerForm, Program, find_program
-from mapspeak.evaluation.agents.finding import find_versions
 from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.evaluation.trials import Limits, TrialState
 

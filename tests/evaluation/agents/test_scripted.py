@@ -8,8 +8,8 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from hearing import Hearing
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient
+from mapspeak.evaluation.agents.catalogue import SCRIPTS
 from mapspeak.evaluation.agents.driver import ToolDriver
-from mapspeak.evaluation.agents.finding import SCRIPTS
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.geometry import Pose

@@ -14,7 +14,7 @@ from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient
-from mapspeak.evaluation.agents.finding import check_agent, find_agent, find_versions
+from mapspeak.evaluation.agents.catalogue import check_agent, find_agent, find_versions
 from mapspeak.evaluation.trials import Limits, TrialState
 from modelserver import N_READ, N_WRITTEN, ModelServer, Speech, Trouble, serve_model
 from modelspeech import SPEECHES, AnthropicMessages, GoogleContents, OpenAIChat

@@ -1,7 +1,7 @@
 import pytest
 
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.tasks.inspecting import AnswerPart, judge_parts
+from mapspeak.evaluation.tasks.inspections import AnswerPart, judge_parts
 from mapspeak.evaluation.trials import Failure, TrialState
 
 MAP = (

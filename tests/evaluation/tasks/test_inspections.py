@@ -8,7 +8,7 @@ import pytest
 from hearing import Hearing
 from mapspeak.evaluation.agent import Assignment, ServerAccess, ToolClient
 from mapspeak.evaluation.agents.baselines import answer_at_random
-from mapspeak.evaluation.agents.finding import SCRIPTS
+from mapspeak.evaluation.agents.catalogue import SCRIPTS
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.runs.workplace import open_inspection
 from mapspeak.evaluation.scores.groundtruth import GroundTruth

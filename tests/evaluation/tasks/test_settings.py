@@ -6,7 +6,7 @@ import pytest
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.geometry import Point, Pose
-from mapspeak.server.prompts import read_text
+from mapspeak.server.toolsets import read_text
 from mapspeak.simulator import load_world, world_names
 from sites import MEMORY_TEXT
 

@@ -16,8 +16,8 @@ from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.discovery import Framing
 from mapspeak.ros.actions import open_action
 from mapspeak.ros.activity import ActionGoal, ActionState
+from mapspeak.ros.link import USUAL_PATIENCE, Patience
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 
 pytestmark = pytest.mark.anyio
 

@@ -8,7 +8,7 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from dds_node import DdsNode, open_both, until
 from mapspeak.errors import LinkError
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 from mapspeak.ros.robot import build_ros_robot
 
 pytestmark = pytest.mark.anyio

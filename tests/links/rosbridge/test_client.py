@@ -18,7 +18,7 @@ from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.links.rosbridge.connection import MAX_REFUSED
 from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
 from mapspeak.links.rosbridge.websocket import MAX_PARTS, MAX_SKIPPED_BYTES
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 from rosbridge_script import (
     PATIENCE_S,
     Operation,

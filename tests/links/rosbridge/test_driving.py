@@ -11,9 +11,9 @@ from causes import code_of, quote_of
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, write_stamp
 from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import STATUS_TOPIC, ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation

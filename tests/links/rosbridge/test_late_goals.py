@@ -13,8 +13,8 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import CauseCode, GoalState
 from mapspeak.ros.actions import ActionClient
 from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, write_stamp
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import (
     ABORTED,

@@ -19,9 +19,9 @@ from mapspeak.links.rosbridge import RosbridgeClient, open_rosbridge_robot
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings
 from mapspeak.ros.discovery.profile import PoseSource
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.poses import write_pose
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock

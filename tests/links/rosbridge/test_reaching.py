@@ -14,7 +14,7 @@ from cryptography.x509.oid import NameOID
 
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.links.rosbridge import RobotAddress, open_client
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, answering_with, running
 
 pytestmark = pytest.mark.anyio

@@ -6,8 +6,8 @@ from drawing import grid_from_text
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import Simulation, TrueFloor, load_world
-from mapspeak.simulator.worlds.mapworld import build_map_world, find_floor
 from mapspeak.simulator.worlds.slices import slice_world
+from mapspeak.simulator.worlds.world import build_map_world, find_floor
 from mapspeak.spatial.mapwriting import write_map
 
 ROOM = """

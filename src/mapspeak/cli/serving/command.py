@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from mapspeak.cli.serving.viewing import LivePage
     from mapspeak.server.app import MapspeakServer
     from mapspeak.server.fleet import FleetServer
-    from mapspeak.server.mapview.representations import Representation
+    from mapspeak.server.reports.representations import Representation
     from mapspeak.server.wire.calllog import CallNoting
     from mapspeak.session import Session
 
@@ -317,7 +317,7 @@ def _build_server(
     session: "Session", options: ServeOptions, call_log: "CallNoting | None"
 ) -> "MapspeakServer":
     from mapspeak.server.app import DEFAULT_TOOLSETS, build_server  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.reports.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.tools.ros.inquiry import require_ros  # noqa: PLC0415
     from mapspeak.skills.skillsfile import load_skills  # noqa: PLC0415
 

@@ -100,7 +100,7 @@ def _open_recorders(
             hint=f"Install it: {say_install('foxglove')}",
         )
     from mapspeak.server.view.recording import record_to, serve_foxglove  # noqa: PLC0415 - optional
-    from mapspeak.server.wire.doors import is_loopback, parse_address  # noqa: PLC0415 - heavy
+    from mapspeak.server.wire.access import is_loopback, parse_address  # noqa: PLC0415 - heavy
 
     recorders = []
     if record is not None:

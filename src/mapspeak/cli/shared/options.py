@@ -17,7 +17,7 @@ from mapspeak.geometry import Pose
 
 if TYPE_CHECKING:
     from mapspeak.safety import Guard
-    from mapspeak.server.mapview.representations import Representation
+    from mapspeak.server.reports.representations import Representation
     from mapspeak.spatial.areagraph import MapAnchor
 
 
@@ -250,7 +250,7 @@ def read_representation(
     """Read how look_at_map is to show the map."""
     if value is None:
         return None
-    from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.reports.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
 
     if value not in set(Representation):
         raise click.BadParameter(f"choose from {', '.join(Representation)}")

@@ -1,16 +1,32 @@
-"""Exploring with the camera: which walls no picture shows yet, and from where to take one."""
+"""Driving for pictures: which walls no picture shows yet, and where to stop for one."""
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 
-from mapspeak.driving.exploration.trips import Target
+from mapspeak.driving.drive import OnProgress
+from mapspeak.driving.drivereport import Drive, DriveReport
+from mapspeak.driving.exploration.trips import Target, TripContext, name_turn, turn_to
+from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory import PictureBook
+from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
+from mapspeak.places.relations.viewpoints import (
+    Face,
+    aim_for_picture,
+    face_new_walls,
+    face_room,
+    find_room_near,
+)
 from mapspeak.places.standing import spread_places
-from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.viewing import (
+from mapspeak.robot import GoalState
+from mapspeak.safety import ApprovalScope
+from mapspeak.spatial.fieldofview import (
     CameraView,
     find_half_view_rad,
     heading_rad,
@@ -19,6 +35,8 @@ from mapspeak.spatial.viewing import (
     new_wall_by_heading,
     sum_by_heading,
 )
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 1.0
@@ -93,3 +111,121 @@ def measure_pictured_on(world: WorldModel, views: Sequence[CameraView]) -> float
 def _target(point: Point, by_heading_m: FloatArray, half_rad: float) -> Target:
     yaw_rad = heading_rad(int(sum_by_heading(by_heading_m, half_rad).argmax()))
     return Target(id=f"({point.x:.1f}, {point.y:.1f})", pose=Pose(point.x, point.y, yaw_rad))
+
+
+TURN_S = 10.0
+"""Robot time that a turn on arrival may take."""
+MOST_DRIVES = 4
+"""To the goal, to where it fits after more of it is mapped, and the turn."""
+SCOPE_S = 600.0
+
+
+class PictureContext(TripContext, Protocol):
+    """A robot, its drives, its map and the pictures it took; a session is one."""
+
+    @property
+    def pictures(self) -> PictureBook:
+        """The pictures taken lately."""
+        ...
+
+
+async def aim(site: PictureContext, goal: CheckedGoal) -> CheckedGoal:
+    """Choose the heading to arrive with, if none was asked for and a picture is wanted."""
+    if not goal.purpose.is_for_picture:
+        return goal
+    world, views = await site.fetch_world_model(), site.pictures.views
+    return await site.compute(partial(aim_for_picture, world, goal, views))
+
+
+def scope_of(place: str) -> ApprovalScope:
+    """Return what a person agrees to at once: the drive to a place, and what ends it there."""
+    what = f"drive to {place} and turn there to look"
+    return ApprovalScope(what=what, n_drives=MOST_DRIVES, duration_s=SCOPE_S)
+
+
+async def turn_for_picture(site: PictureContext, *, client: str, on_progress: OnProgress) -> None:
+    """Turn the robot where it stands to what no picture shows.
+
+    It stays as it is without a camera, and where it was stopped or another client drives it.
+    """
+    if not site.robot.description.has_camera:
+        return
+    world, views = await site.fetch_world_model(), site.pictures.views
+    pose = await site.compute(partial(face_new_walls, world, world.robot, views))
+    if pose == world.robot:
+        return
+    with suppress(GoalError, PolicyError):
+        await turn_to(site, pose.yaw_rad, wait_s=TURN_S, on_progress=on_progress, client=client)
+
+
+async def end_for_picture(
+    site: PictureContext, report: DriveReport, *, wait_s: float, on_progress: OnProgress
+) -> DriveReport:
+    """End a drive that is for a picture by what the robot has mapped on the way.
+
+    Where it proves that the robot does not fit at the goal, it is sent to the nearest place where
+    it does. Where it has arrived, it is turned to what no picture shows.
+
+    Args:
+        wait_s: Robot time to wait for another drive.
+
+    Returns:
+        Of the drive that goes on, or of this one with the pose after the turn; the same report
+        where nothing is to be done, or another drive has been started by now.
+    """
+    drive, state = report.drive, report.status.state
+    latest = site.drives.latest
+    is_latest = latest is not None and latest.goal_id == drive.goal_id
+    if not drive.purpose.is_for_picture or not is_latest:
+        return report
+    try:
+        if state is GoalState.BLOCKED:
+            report = await _drive_nearby(site, report, wait_s, on_progress)
+        if report.status.state is GoalState.ARRIVED:
+            report = await _turn_to_new_walls(site, report, on_progress)
+    except (GoalError, PolicyError):
+        # The robot was stopped or another client drives it: how this drive ended stays true.
+        return report
+    return report
+
+
+def _choose_face(drive: Drive) -> Face:
+    return face_room if drive.purpose is GoalPurpose.LOOK_INSIDE else face_new_walls
+
+
+async def _drive_nearby(
+    site: PictureContext, report: DriveReport, wait_s: float, on_progress: OnProgress
+) -> DriveReport:
+    """Send the robot to the place nearest to a goal at which it does not fit."""
+    drive = report.drive
+    world, views = await site.fetch_world_model(), site.pictures.views
+    point = await site.compute(partial(find_room_near, world, drive.goal.point))
+    if point is None:
+        return report
+    pose = Pose(point.x, point.y, drive.goal.yaw_rad)
+    pose = await site.compute(partial(_choose_face(drive), world, pose, views))
+    nearby = await site.drives.start(
+        pose, place=drive.place, ticket=drive.ticket, client=drive.client, purpose=drive.purpose
+    )
+    return await site.drives.wait(nearby.goal_id, wait_s=wait_s, on_progress=on_progress)
+
+
+async def _turn_to_new_walls(
+    site: PictureContext, report: DriveReport, on_progress: OnProgress
+) -> DriveReport:
+    drive = report.drive
+    world, views = await site.fetch_world_model(), site.pictures.views
+    pose = await site.compute(partial(_choose_face(drive), world, report.pose, views))
+    if pose == report.pose:
+        return report
+    turn = await site.drives.start(
+        pose, place=name_turn(pose), ticket=drive.ticket, client=drive.client
+    )
+    turned = await site.drives.wait(turn.goal_id, wait_s=TURN_S, on_progress=on_progress)
+    faced = replace(drive.goal, yaw_rad=pose.yaw_rad)
+    return replace(
+        turned,
+        drive=replace(drive, goal=faced),
+        status=report.status,
+        elapsed_s=report.elapsed_s + turned.elapsed_s,
+    )

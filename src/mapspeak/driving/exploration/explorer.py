@@ -6,11 +6,12 @@ from collections.abc import Awaitable, Callable, Sequence
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
 from mapspeak.driving.exploration.camera import (
+    PictureContext,
     find_camera_target,
     is_view_due,
     measure_pictured_on,
+    turn_for_picture,
 )
-from mapspeak.driving.exploration.picturing import PictureContext, turn_for_picture
 from mapspeak.driving.exploration.progress import (
     BoundKind,
     Bounds,

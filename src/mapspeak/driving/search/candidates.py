@@ -15,9 +15,9 @@ from mapspeak.memory.search.answer import Verdict
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.places.standing import spread_places
+from mapspeak.spatial.fieldofview import floor_by_heading, heading_index, heading_rad
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import Mask
-from mapspeak.spatial.viewing import floor_by_heading, heading_index, heading_rad
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
 from mapspeak.spatial.grid import IntArray, Mask
-from mapspeak.spatial.viewing import HALF_VIEW_RAD
 from mapspeak.spatial.visibility import cast_rays
 
 REACH_M = 4.0

@@ -21,7 +21,7 @@ from mapspeak.evaluation.agent import (
     ToolClient,
     Witness,
 )
-from mapspeak.evaluation.agents.finding import find_agent
+from mapspeak.evaluation.agents.catalogue import find_agent
 from mapspeak.evaluation.runs.workplace import CONTROL, TrialSetup, open_workplace
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence

@@ -10,12 +10,12 @@ import numpy as np
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.finding import BEARINGS, can_think, find_versions, read_thinking
+from mapspeak.evaluation.agents.catalogue import BEARINGS, can_think, find_versions, read_thinking
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import EXPLORE, choose_tasks, find_task
 from mapspeak.evaluation.tasks.task import Task
 from mapspeak.evaluation.trials import Trial
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.reports.representations import Representation
 from mapspeak.simulator import World, load_world, world_names
 
 ALL_WORLDS = "all"

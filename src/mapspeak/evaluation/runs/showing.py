@@ -19,7 +19,7 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
-from mapspeak.evaluation.agents.finding import can_think, is_script
+from mapspeak.evaluation.agents.catalogue import can_think, is_script
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
 from mapspeak.evaluation.scores.rows import TableRow, wilson_interval
 from mapspeak.evaluation.tasks.catalogue import EXPLORE

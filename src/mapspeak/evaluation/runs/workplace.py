@@ -15,7 +15,7 @@ from mcp.client.stdio import StdioServerParameters
 from mcp.server.mcpserver import MCPServer
 
 from mapspeak.evaluation.agent import ServerAccess
-from mapspeak.evaluation.inspected.playing import InspectedSystem, play
+from mapspeak.evaluation.inspected import InspectedSystem, play
 from mapspeak.evaluation.scores.judging import NOWHERE
 from mapspeak.evaluation.trials import CALLS, MAP, MEMORY, STATES, Setting, Trial
 from mapspeak.links.rosbridge import open_rosbridge_robot
@@ -23,7 +23,7 @@ from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.reports.representations import Representation
 from mapspeak.server.view.replay import MAPS, MapLog
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World

@@ -19,7 +19,7 @@ from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
 from mapspeak.evaluation.tasks.task import Draw, Task
 from mapspeak.evaluation.tasks.things import OBJECT_TASKS, RELATION_TASKS, ROUTE_TASK
 from mapspeak.evaluation.trials import Limits, Setting
-from mapspeak.server.prompts import read_text
+from mapspeak.server.toolsets import read_text
 
 EXPLORE = "explore"
 EXPLORE_LIMITS = Limits(n_calls=1000, robot_time_s=3600.0, wall_s=math.inf)

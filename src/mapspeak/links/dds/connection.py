@@ -36,7 +36,7 @@ from mapspeak.links.endpoints import (
 from mapspeak.links.native import SEND_GOAL, NativeLink
 from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.patience import USUAL_PATIENCE, Patience
+from mapspeak.ros.link import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph, keep_open
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 

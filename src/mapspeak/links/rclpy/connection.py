@@ -17,9 +17,8 @@ from mapspeak.links.rclpy.endpoints import RclpyReader, RclpyService, RclpyWrite
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.link import plain_errors
+from mapspeak.ros.link import Patience, plain_errors
 from mapspeak.ros.messages.fields import bare_type, check_name
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection, keep_open
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.patience import USUAL_PATIENCE, Patience
+from mapspeak.ros.link import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 

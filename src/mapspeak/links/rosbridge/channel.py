@@ -14,7 +14,7 @@ from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.connection import SocketConnection
 from mapspeak.links.rosbridge.protocol.conversation import Event, ServerEvent, write_operation
 from mapspeak.links.rosbridge.websocket import open_websocket
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 
 logger = logging.getLogger(__name__)
 

@@ -23,9 +23,8 @@ from mapspeak.links.rosbridge.protocol.conversation import (
 from mapspeak.links.rosbridge.rosapi import Rosapi
 from mapspeak.ros.activity import ActionEnd, ActionGoal, Subscription
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.link import NOTICE_S
+from mapspeak.ros.link import NOTICE_S, USUAL_PATIENCE, Patience
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
-from mapspeak.ros.patience import USUAL_PATIENCE, Patience
 from mapspeak.ros.port import LinkName, OwnEnds, keep_open, new_id
 from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 

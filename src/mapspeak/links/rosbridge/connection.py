@@ -19,7 +19,7 @@ from mapspeak.links.rosbridge.protocol.conversation import (
     ServerEvent,
 )
 from mapspeak.links.rosbridge.websocket import Received, SocketClosed, WebSocket
-from mapspeak.ros.patience import Patience
+from mapspeak.ros.link import Patience
 
 logger = logging.getLogger(__name__)
 

@@ -16,8 +16,8 @@ from mapspeak.ros.definitions.texts import (
     split_definition,
 )
 from mapspeak.ros.definitions.types import TypeBook
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, bare_type, read_stamp
-from mapspeak.ros.patience import Patience
 from mapspeak.ros.port import NodeLinks, RosConnection, RosGraph
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]

@@ -26,8 +26,8 @@ from mapspeak.ros.robot.poses import RobotClock
 from mapspeak.ros.robot.sensors import IdleSubscriptions
 from mapspeak.ros.transforms import FrameListener
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.fieldofview import trace_outlines
 from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.viewing import trace_outlines
 
 PATH, POLYGON = "nav_msgs/Path", "geometry_msgs/PolygonStamped"
 USUAL_NAMES = {

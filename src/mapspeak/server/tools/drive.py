@@ -8,11 +8,11 @@ from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration.picturing import aim, end_for_picture, scope_of
+from mapspeak.driving.exploration.camera import aim, end_for_picture, scope_of
 from mapspeak.driving.exploration.trips import spread_headings, turn_to
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.places.relations.choosing import GoalPurpose
-from mapspeak.places.views.sights import choose_view, is_there
+from mapspeak.places.relations.viewpoints import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.robot import DriveAnswer

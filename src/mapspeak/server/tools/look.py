@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import LinkError, MapError
-from mapspeak.server.mapview.representations import Representation, show
+from mapspeak.server.reports.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.world.drives import say_on_the_way

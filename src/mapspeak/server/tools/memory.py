@@ -38,7 +38,7 @@ from mapspeak.server.text.moments import AHEAD, PAST, read_coming, read_past
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_forgotten
 from mapspeak.server.text.wording import say_renamed
-from mapspeak.server.tools.finding import find_point, find_room
+from mapspeak.server.tools.places import find_point, find_room
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.worldmodel.model import WorldModel

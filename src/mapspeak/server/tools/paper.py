@@ -17,7 +17,7 @@ from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall.asking import find_speaking_places
 from mapspeak.places.recall.forgetting import find_gone, forget_thing
 from mapspeak.robot import PoseDoubt
-from mapspeak.server.mapview.drawing import say_axes, say_plain
+from mapspeak.server.reports.mappicture import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far

@@ -11,7 +11,7 @@ from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
 from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan
 from mapspeak.safety import ApprovalScope, within_scope
-from mapspeak.server.reports.routes import RouteAnswer
+from mapspeak.server.reports.exploring import RouteAnswer
 from mapspeak.server.text.wording import shorten
 from mapspeak.server.tools.asking import (
     AT_MOST_LONGEST_WAIT,

@@ -28,7 +28,7 @@ from mapspeak.server.view.document import NavigationView
 from mapspeak.server.view.feed import ViewFeed
 from mapspeak.server.view.keys import NOBODY, PageKeys
 from mapspeak.server.view.pages import find_leaflet_files, find_page_files, link_page
-from mapspeak.server.wire.doors import (
+from mapspeak.server.wire.access import (
     HostGuard,
     ReadyServer,
     find_security,

@@ -19,7 +19,6 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import ConfigError, say_cause
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.simulator.worlds.mapworld import build_map_world
 from mapspeak.simulator.worlds.models import kind_names
 from mapspeak.simulator.worlds.slices import slice_world
 from mapspeak.simulator.worlds.world import (
@@ -30,6 +29,7 @@ from mapspeak.simulator.worlds.world import (
     WorldDoor,
     WorldObject,
     WorldWall,
+    build_map_world,
 )
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import RoomClass

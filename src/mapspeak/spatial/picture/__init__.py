@@ -21,7 +21,7 @@ from mapspeak.spatial.picture.marks import (
     Zone,
 )
 from mapspeak.spatial.picture.plan import Zoom
-from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, PictureView, paper_spacing_m
+from mapspeak.spatial.picture.transform import NORTH_UP_RAD, Box, PictureView, paper_spacing_m
 
 __all__ = [
     "NORTH_UP_RAD",

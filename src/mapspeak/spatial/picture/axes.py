@@ -24,7 +24,7 @@ from mapspeak.spatial.picture.marks import (
     Canvas,
 )
 from mapspeak.spatial.picture.plan import Extent, Margins
-from mapspeak.spatial.picture.view import Box, PictureView, is_north_up
+from mapspeak.spatial.picture.transform import Box, PictureView, is_north_up
 
 _NUMBER_GAP_PX = 6
 _CORNER_PX = 1e-6

@@ -41,7 +41,7 @@ from mapspeak.spatial.picture.regions import (
     paint_regions,
     paint_zones,
 )
-from mapspeak.spatial.picture.view import (
+from mapspeak.spatial.picture.transform import (
     NORTH_UP_RAD,
     PictureView,
     even_spacing_m,

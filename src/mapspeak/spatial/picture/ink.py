@@ -27,7 +27,7 @@ from mapspeak.spatial.picture.marks import (
     LineStyle,
     Shape,
 )
-from mapspeak.spatial.picture.view import Box, PictureView
+from mapspeak.spatial.picture.transform import Box, PictureView
 
 LABEL_SIZE_PX = 16
 NUMBER_SIZE_PX = 14

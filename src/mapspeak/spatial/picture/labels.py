@@ -11,7 +11,7 @@ import numpy as np
 from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.picture.ink import SYMBOL_REACH_PX, draw_polygon, draw_stroke, stamp
 from mapspeak.spatial.picture.marks import Canvas, Colour, Mark, PictureRegion
-from mapspeak.spatial.picture.view import Box
+from mapspeak.spatial.picture.transform import Box
 
 HALO_PX = 3
 _N_DIRECTIONS = 16

@@ -38,7 +38,7 @@ from mapspeak.spatial.picture.marks import (
     Shape,
 )
 from mapspeak.spatial.picture.regions import AUTOMATIC_COLOURS, ZONE_NUMBER
-from mapspeak.spatial.picture.view import PictureView, is_north_up, round_length_m
+from mapspeak.spatial.picture.transform import PictureView, is_north_up, round_length_m
 
 ROW_PX = 23
 _GAP_PX = 18

@@ -25,7 +25,7 @@ from mapspeak.spatial.picture.labels import (
     leader_of,
 )
 from mapspeak.spatial.picture.marks import IS_BUSY, Canvas
-from mapspeak.spatial.picture.view import Box
+from mapspeak.spatial.picture.transform import Box
 
 _COST_OF_CROSSING = 12.0
 _COST_OF_HINDERING = 1.2

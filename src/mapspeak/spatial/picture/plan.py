@@ -8,7 +8,7 @@ import numpy as np
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray, IntArray, OccupancyGrid
-from mapspeak.spatial.picture.view import Box, PictureView, is_aligned
+from mapspeak.spatial.picture.transform import Box, PictureView, is_aligned
 
 MAX_EDGE_PX = 1072
 """A square picture of this edge has 1.15 megapixels, as much as vision models take in whole."""

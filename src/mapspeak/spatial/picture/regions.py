@@ -17,7 +17,7 @@ from mapspeak.spatial.picture.marks import (
     RegionLayer,
     Zone,
 )
-from mapspeak.spatial.picture.view import PictureView
+from mapspeak.spatial.picture.transform import PictureView
 
 AUTOMATIC_COLOURS = (
     Colour.SKY,

@@ -16,12 +16,11 @@ from PIL import Image as Picture
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Point
 from mapspeak.ros.definitions.types import Field
-from mapspeak.ros.messages.clouds import read_cloud
 from mapspeak.ros.messages.fields import Message, parts_of, read_header, text_of
 from mapspeak.ros.messages.grids import read_grid
 from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
 from mapspeak.ros.messages.poses import read_pose_stamped, read_transforms
-from mapspeak.ros.messages.scans import LaserScan, mend_scan, read_scan
+from mapspeak.ros.messages.scans import LaserScan, mend_scan, read_cloud, read_scan
 from mapspeak.server.text.ros.values import show_message, show_value
 from mapspeak.server.text.wording import say_point, say_pose
 from mapspeak.spatial.picture import draw_map_axis

@@ -10,7 +10,7 @@ from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place
 from mapspeak.places.recall.asking import SURE_RATIO, describe_candidate
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
-from mapspeak.places.views.sights import Sight, find_sights, measure_shown
+from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
 from mapspeak.places.ways import standing_point
 from mapspeak.robot import CameraPicture
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support
@@ -27,9 +27,9 @@ from mapspeak.server.text.wording import (
 )
 from mapspeak.server.text.world.maps import say_merits, say_size
 from mapspeak.server.text.world.tables import say_walk
+from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
-from mapspeak.spatial.viewing import HALF_VIEW_RAD
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 

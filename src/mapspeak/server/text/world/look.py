@@ -14,11 +14,11 @@ from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.robot import NavigationLook
+from mapspeak.spatial.fieldofview import CameraView, mask_pictured, outline_unpictured
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass
-from mapspeak.spatial.viewing import CameraView, mask_pictured, outline_unpictured
 from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace

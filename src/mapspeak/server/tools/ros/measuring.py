@@ -8,7 +8,7 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.census import ask_each, fetch_publishers
-from mapspeak.ros.definitions.sizes import measure_message
+from mapspeak.ros.definitions.types import measure_message
 from mapspeak.ros.hearing import hear_frames
 from mapspeak.ros.messages.fields import Message
 from mapspeak.server.text.ros.frames import say_frames, say_transform

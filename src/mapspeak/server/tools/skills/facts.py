@@ -5,7 +5,7 @@ from datetime import datetime
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Point
 from mapspeak.places.naming import find_named
-from mapspeak.server.tools.finding import find_point
+from mapspeak.server.tools.places import find_point
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.session import Session
 

@@ -6,7 +6,7 @@ from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.memory.episodes.observation import ObservationKind
-from mapspeak.places.views.sights import choose_view, is_there
+from mapspeak.places.relations.viewpoints import choose_view, is_there
 from mapspeak.robot import GoalState
 from mapspeak.safety import current_caller
 from mapspeak.server.tools.sightings import look_ahead

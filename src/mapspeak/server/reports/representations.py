@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
-from mapspeak.server.mapview.drawing import GREYS, draw_world, say_axes
+from mapspeak.server.reports.mappicture import GREYS, draw_world, say_axes
 from mapspeak.server.text.wording import say_pose, say_warnings
 from mapspeak.server.text.world.look import MapView
 from mapspeak.server.text.world.tables import describe_world

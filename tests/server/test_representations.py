@@ -16,7 +16,7 @@ from mapspeak.cli.serving.command import serve
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
-from mapspeak.server.mapview.representations import Representation
+from mapspeak.server.reports.representations import Representation
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import draw_robot_pose

@@ -7,8 +7,13 @@ import pytest
 
 from fakes import two_rooms
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
-from mapspeak.evaluation.inspected.playing import InspectedSystem, play
+from mapspeak.evaluation.inspected import (
+    InspectedSystem,
+    Names,
+    draw_names,
+    draw_system,
+    play,
+)
 from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages.fields import Dialect, read_header
 from mapspeak.ros.messages.grids import read_grid

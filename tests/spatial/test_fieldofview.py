@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
-from mapspeak.spatial.viewing import (
+from mapspeak.spatial.fieldofview import (
     N_RAYS,
     CameraView,
     heading_of,

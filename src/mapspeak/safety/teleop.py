@@ -13,7 +13,7 @@ from mapspeak.errors import LinkError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Robot
 from mapspeak.safety.deciding import Refused, find_speeds, refuse
-from mapspeak.safety.guard import Surveyor
+from mapspeak.safety.guard import MapReviser
 from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered, follow_arc
 from mapspeak.safety.planning import Planner
 
@@ -58,20 +58,20 @@ class Velocity:
         return math.hypot(self.forward_mps, self.left_mps)
 
 
-class HandDriving:
+class Teleop:
     """Knows the velocities that were published, and judges those that are to be."""
 
-    def __init__(self, robot: Robot, *, planner: Planner, surveyor: Surveyor) -> None:
+    def __init__(self, robot: Robot, *, planner: Planner, reviser: MapReviser) -> None:
         self._robot = robot
         self._planner = planner
-        self._surveyor = surveyor
+        self._reviser = reviser
         self._zeros: dict[str, Callable[[], object]] = {}
         self._moving: set[str] = set()
 
     @property
     def knows_areas(self) -> bool:
         """True when there is anything that may be closed, now or at another hour."""
-        return self._surveyor.has_rules
+        return self._reviser.has_rules
 
     @property
     def is_under_way(self) -> bool:
@@ -83,11 +83,11 @@ class HandDriving:
 
         An unknown pose counts as an objection.
         """
-        if not self._surveyor.has_rules or not _is_moving(message):
+        if not self._reviser.has_rules or not _is_moving(message):
             return None
         try:
             here = (await self._robot.fetch_pose()).pose
-            await self._planner.survey_lately()
+            await self._planner.revise_lately()
         except LinkError as error:
             return refuse_velocity(
                 "The policy closes areas, and where the robot is cannot be known now: "
@@ -111,7 +111,7 @@ class HandDriving:
             self.end(topic)
 
     def _find_objection(self, message: Message, here: Pose) -> Refused | None:
-        revision = self._surveyor.latest
+        revision = self._reviser.latest
         if revision is None:
             return None
         areas, radius_m = revision.areas, revision.radius_m

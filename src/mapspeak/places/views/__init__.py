@@ -1,1 +1,0 @@
-"""Looking at places: which way to face, from where a place is in view, and what should be."""
