@@ -33,7 +33,7 @@ from mapspeak.links.dds.endpoints import (
 from mapspeak.links.dds.participant import DdsNetwork, DdsParticipant
 from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
 from mapspeak.links.endpoints import Sample
-from mapspeak.ros.definitions.typestore import hash_type
+from mapspeak.ros.definitions.types import hash_type
 from mapspeak.ros.link import USUAL_PATIENCE, Patience
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from fakes import two_rooms
-from mapspeak.ros.hearing import Heard
+from mapspeak.ros.listening import Heard
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.server.text.ros.listening import say_rate, say_stamp

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mapspeak.geometry import Pose
-from mapspeak.ros.hearing import FrameLink
+from mapspeak.ros.listening import FrameLink
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.server.text.ros.frames import say_frames

@@ -14,8 +14,8 @@ from bridging import SteppedRobot
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, open_client
-from mapspeak.ros.hearing import hear
 from mapspeak.ros.link import Patience
+from mapspeak.ros.listening import hear
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_robot import ScriptedRobot

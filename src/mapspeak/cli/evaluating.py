@@ -154,20 +154,18 @@ def _report(folder: Path) -> None:
             hint="Name the folder that was given as --out.",
         )
     with writing_to(folder):
-        _write_report(folder, results, {}, is_whole=True)
+        _write_report(folder, results, {})
 
 
 def _write_report(
     folder: Path,
     results: "Sequence[TrialResult]",
     versions: "Mapping[str, str]",
-    *,
-    is_whole: bool,
 ) -> None:
     from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
 
-    log = write_log(folder, results, versions, is_whole=is_whole)
+    log = write_log(folder, results, versions)
     click.echo(f"The trials can be replayed in {write_page(folder, results)}; the log is {log}.")
 
 
@@ -203,5 +201,5 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
     if not console.is_terminal:
         console.width = TABLE_WIDTH
     console.print(build_table(count_rows(results)))
-    _write_report(options.folder, results, plan.versions, is_whole=True)
+    _write_report(options.folder, results, plan.versions)
     return 1 if bar.n_broken else 0

@@ -15,8 +15,7 @@ import click
 
 from mapspeak.cli.evaluating import INTERRUPTED
 from mapspeak.cli.operating import StopKeys, Tell, stop_keys
-from mapspeak.cli.serving.drawing import MARKERS_OPTION
-from mapspeak.cli.serving.viewing import VIEW_OPTION
+from mapspeak.cli.serving.viewing import MARKERS_OPTION, VIEW_OPTION
 from mapspeak.cli.shared.options import SEED_OPTION, WORLD_OPTION, usual_modes
 from mapspeak.errors import ConfigError
 

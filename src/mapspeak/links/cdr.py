@@ -16,8 +16,14 @@ from rosbags.typesys.store import Typestore
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.definitions.checking import check_message
-from mapspeak.ros.definitions.types import Field, MessageType, TypeBook
-from mapspeak.ros.definitions.typestore import NOTHING, describe_field, look_up
+from mapspeak.ros.definitions.types import (
+    NOTHING,
+    Field,
+    MessageType,
+    TypeBook,
+    describe_field,
+    look_up,
+)
 from mapspeak.ros.messages.fields import Message
 
 HEADER_BYTES = 4

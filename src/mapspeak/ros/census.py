@@ -44,10 +44,10 @@ class Census:
         found = [name for name, links in self.links.items() if topic in links.publishes]
         return _tell_apart(found, self.own, is_ours=topic in self.own.publishes)
 
-    def hearers_of(self, topic: str) -> Nodes:
+    def subscribers_of(self, topic: str) -> Nodes:
         """Return the subscribers of a topic."""
         found = [name for name, links in self.links.items() if topic in links.subscribes]
-        return _tell_apart(found, self.own, is_ours=topic in self.own.hears)
+        return _tell_apart(found, self.own, is_ours=topic in self.own.subscribes)
 
 
 async def take_census(connection: RosConnection, nodes: Iterable[str]) -> Census:
@@ -86,10 +86,10 @@ async def fetch_publishers(connection: RosConnection, topic: str) -> Nodes:
     return _tell_apart(found, own, is_ours=topic in own.publishes)
 
 
-async def fetch_hearers(connection: RosConnection, topic: str) -> Nodes:
+async def fetch_subscribers(connection: RosConnection, topic: str) -> Nodes:
     """Return the subscribers of one topic."""
     own, found = connection.own_ends, await connection.fetch_subscribers(topic)
-    return _tell_apart(found, own, is_ours=topic in own.hears)
+    return _tell_apart(found, own, is_ours=topic in own.subscribes)
 
 
 async def find_server(connection: RosConnection, service: str) -> str | None:

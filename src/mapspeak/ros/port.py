@@ -91,12 +91,12 @@ class OwnEnds:
         node: The last part of the name of the node that publishes and subscribes for us; empty
             where the graph shows none.
         publishes: Topics that it publishes for us.
-        hears: Topics that it subscribes to for us.
+        subscribes: Topics that it subscribes to for us.
     """
 
     node: str = ""
     publishes: frozenset[str] = frozenset()
-    hears: frozenset[str] = frozenset()
+    subscribes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

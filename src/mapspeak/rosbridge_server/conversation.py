@@ -107,7 +107,7 @@ class ClientConversation:
             length = min(length or LONGEST_MESSAGE, LONGEST_MESSAGE)
         if not frame.is_text or length is None or len(frame.data) <= length:
             return (frame,)
-        return fragments_of(frame, length=length, fragment_id="0")
+        return fragments_of(frame, length=length)
 
     def _frame_of(self, publication: Publication) -> Frame | None:
         subscription = self._subscriptions.get(publication.topic)

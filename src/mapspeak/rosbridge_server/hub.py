@@ -70,13 +70,13 @@ def answer_frame(operation: Message, answer: Message) -> Frame:
     return Frame(to_json(named), is_text=True)
 
 
-def fragments_of(frame: Frame, *, length: int, fragment_id: str) -> Iterator[Frame]:
+def fragments_of(frame: Frame, *, length: int) -> Iterator[Frame]:
     """Return a text in pieces of a given length, as the operation `fragment`."""
     text = frame.data.decode()
     for number, start in enumerate(range(0, len(text), length)):
         piece = {
             "op": "fragment",
-            "id": fragment_id,
+            "id": "0",
             "data": text[start : start + length],
             "num": number,
             # The real one forgets to round down.

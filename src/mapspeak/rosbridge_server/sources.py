@@ -25,8 +25,8 @@ from mapspeak.ros.messages.poses import (
 )
 from mapspeak.ros.messages.scans import LaserScan, write_camera_info, write_scan
 from mapspeak.rosbridge_server.hub import Hub
+from mapspeak.rosbridge_server.interfaces import BATTERY_TOPIC, write_battery
 from mapspeak.rosbridge_server.navigation import BASE_FRAME
-from mapspeak.rosbridge_server.skillservices import BATTERY_TOPIC, write_battery
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
 

@@ -14,16 +14,18 @@ from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FramedPose, read_twist
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub, Publication, Topic
-from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem, Values
-from mapspeak.rosbridge_server.navigation import ACTION, BASE_FRAME, Drives, MoveBase, Nav2
-from mapspeak.rosbridge_server.rosapi import Parameters, add_parameter_services, add_rosapi
-from mapspeak.rosbridge_server.skillservices import (
+from mapspeak.rosbridge_server.interfaces import (
     BATTERY_TOPIC,
     BATTERY_TYPE,
     NODE,
+    Interfaces,
+    RosSystem,
+    Values,
     offer_skills,
     types_of,
 )
+from mapspeak.rosbridge_server.navigation import ACTION, BASE_FRAME, Drives, MoveBase, Nav2
+from mapspeak.rosbridge_server.rosapi import Parameters, add_parameter_services, add_rosapi
 from mapspeak.rosbridge_server.sources import (
     NAVIGATION_TOPICS,
     SCAN_TOPIC,
@@ -122,8 +124,6 @@ class RosStack(RosSystem):
 
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
-        hub: Carries the robot's topics; one is made of `topics_of` where none is given.
-        drives: Takes the goals; likewise.
         skilled: The robot where it has skills of its own.
     """
 
@@ -132,8 +132,6 @@ class RosStack(RosSystem):
         robot: Robot,
         *,
         dialect: Dialect,
-        hub: Hub | None = None,
-        drives: Drives | None = None,
         skilled: SkilledRobot | None = None,
     ) -> None:
         topics = topics_of(dialect, robot.description)
@@ -141,9 +139,9 @@ class RosStack(RosSystem):
         if skilled is not None:
             topics.append(_published(BATTERY_TOPIC, BATTERY_TYPE, NODE, depth=1))
         interfaces = Interfaces(dialect, more=types_of(skills))
-        super().__init__(hub or Hub(topics), interfaces, dialect=dialect)
+        super().__init__(Hub(topics), interfaces, dialect=dialect)
         offer_skills(self, skills)
-        self._drives = drives or Drives(robot)
+        self._drives = Drives(robot)
         self._robot = robot
         self._sources = Sources(robot, self.hub, dialect=dialect, skilled=skilled)
         self._navigation: Nav2 | MoveBase

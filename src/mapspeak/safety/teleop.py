@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from typing import Any
 
 import anyio
@@ -12,6 +11,7 @@ import anyio
 from mapspeak.errors import LinkError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Robot
+from mapspeak.ros.messages.poses import Twist
 from mapspeak.safety.deciding import Refused, find_speeds, refuse
 from mapspeak.safety.guard import MapReviser
 from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered, follow_arc
@@ -36,26 +36,6 @@ def publishing_for(duration_s: float) -> Generator[None]:
         yield
     finally:
         _UNTIL_S.reset(token)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Velocity:
-    """A velocity in the plane, in the robot's own frame.
-
-    Attributes:
-        forward_mps: Along x.
-        left_mps: Along y.
-        turn_radps: Counter-clockwise.
-    """
-
-    forward_mps: float
-    left_mps: float = 0.0
-    turn_radps: float = 0.0
-
-    @property
-    def speed_mps(self) -> float:
-        """The length of its linear part."""
-        return math.hypot(self.forward_mps, self.left_mps)
 
 
 class Teleop:
@@ -186,14 +166,14 @@ def _is_moving(message: Message) -> bool:
     return any(speeds) and all(map(math.isfinite, speeds))
 
 
-def _read_velocity(message: Message) -> Velocity | None:
+def _read_velocity(message: Message) -> Twist | None:
     """Return the velocity of a Twist or TwistStamped; None for all that holds other speeds."""
     twist = message.get("twist", message)
     parts = {"linear", "angular"} & twist.keys() if isinstance(twist, Mapping) else set()
     if not parts or len(parts) != len(list(find_speeds(message))):
         return None
     linear, angular = twist.get("linear", {}), twist.get("angular", {})
-    return Velocity(
+    return Twist(
         forward_mps=float(linear.get("x", 0.0)),
         left_mps=float(linear.get("y", 0.0)),
         turn_radps=float(angular.get("z", 0.0)),
@@ -205,9 +185,9 @@ def _reach_m(speed_mps: float, lasts_s: float) -> float:
     return speed_mps * lasts_s + speed_mps**2 / (2 * BRAKING_MPS2)
 
 
-def _predict(here: Pose, velocity: Velocity, lasts_s: float) -> tuple[Point, ...]:
+def _predict(here: Pose, velocity: Twist, lasts_s: float) -> tuple[Point, ...]:
     """Return points on the way until the robot stands, the velocity held until it brakes."""
-    speed_mps = velocity.speed_mps
+    speed_mps = math.hypot(velocity.forward_mps, velocity.left_mps)
     if speed_mps == 0.0:
         return ()
     length_m = _reach_m(speed_mps, lasts_s)

@@ -12,8 +12,7 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 from mapspeak.errors import LinkError
 from mapspeak.links.cdr import MOST_BYTES, MOST_FIELDS, MOST_MESSAGES, Codec
 from mapspeak.links.dds.types import build_type_book
-from mapspeak.ros.definitions.types import TypeBook
-from mapspeak.ros.definitions.typestore import hash_type
+from mapspeak.ros.definitions.types import TypeBook, hash_type
 
 CODEC = Codec(build_type_book())
 MOST_ALLOCATED_BYTES = 500_000

@@ -16,7 +16,7 @@ from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.types import Types, build_type_book
 from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.definitions.texts import DISTROS
-from mapspeak.ros.definitions.typestore import hash_type
+from mapspeak.ros.definitions.types import hash_type
 
 pytestmark = pytest.mark.anyio
 

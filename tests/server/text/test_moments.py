@@ -13,7 +13,7 @@ NOW = datetime(2026, 11, 23, 12, 0, tzinfo=UTC)
 
 @pytest.mark.parametrize("written", re.split(r", | or ", AHEAD))
 def test_what_the_schema_of_an_event_names_is_read(written: str) -> None:
-    assert read_moment(written, NOW, is_ahead=True) is not None
+    assert read_moment(written, NOW) is not None
 
 
 @pytest.mark.parametrize("written", re.split(r", | or ", PAST))
@@ -41,7 +41,7 @@ def test_what_the_schema_of_a_search_names_is_read_as_past(written: str) -> None
 def test_a_span_is_counted_ahead_for_events_unless_it_says_ago(
     written: str, ahead_s: float
 ) -> None:
-    assert read_moment(written, NOW, is_ahead=True) == NOW + timedelta(seconds=ahead_s)
+    assert read_moment(written, NOW) == NOW + timedelta(seconds=ahead_s)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_a_span_is_counted_back_for_episodes_unless_it_says_in(
 )
 def test_what_is_no_time_is_refused_with_what_is_one(written: str) -> None:
     with pytest.raises(SemanticMapError, match="is no time") as error:
-        read_moment(written, NOW, is_ahead=True)
+        read_moment(written, NOW)
     assert AHEAD in error.value.hint
 
 
@@ -121,4 +121,4 @@ def test_from_a_moment_to_a_period_is_to_its_end() -> None:
     [("tomorrow 8:00", 32), ("3 pm", 15), ("9 am", 33), ("Tuesday 8:00", 32), ("tonight", 22)],
 )
 def test_a_time_of_an_event_is_still_to_come(written: str, hour: float) -> None:
-    assert read_moment(written, NOW, is_ahead=True) == MONDAY + timedelta(hours=hour)
+    assert read_moment(written, NOW) == MONDAY + timedelta(hours=hour)

@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import click
 
-from mapspeak.cli.serving.drawing import DRAWING_OPTIONS, open_drawing
 from mapspeak.cli.serving.starting import RobotStart, open_session, read_starts
-from mapspeak.cli.serving.viewing import VIEW_OPTION, make_page
+from mapspeak.cli.serving.viewing import DRAWING_OPTIONS, VIEW_OPTION, make_page, open_drawing
 from mapspeak.cli.shared.options import (
     DEFAULT_WORLD,
     FILE,

@@ -7,8 +7,7 @@ from typing import Any
 from mapspeak.errors import LinkError
 from mapspeak.links.cdr import KnownTypes
 from mapspeak.ros.definitions.texts import DISTROS, action_parts, find_parts, known_definitions
-from mapspeak.ros.definitions.types import TypeBook
-from mapspeak.ros.definitions.typestore import hash_type
+from mapspeak.ros.definitions.types import TypeBook, hash_type
 from mapspeak.ros.messages.fields import TYPE, Dialect, Message, bare_type
 
 _NODES = (

@@ -19,8 +19,7 @@ from mapspeak.ros.definitions.texts import (
     action_parts,
     split_parts,
 )
-from mapspeak.ros.definitions.types import TypeBook
-from mapspeak.ros.definitions.typestore import NOTHING
+from mapspeak.ros.definitions.types import NOTHING, TypeBook
 from mapspeak.ros.messages.fields import TYPE, bare_type, check_type
 
 FIELD = re.compile(

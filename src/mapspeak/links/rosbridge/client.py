@@ -97,7 +97,7 @@ class RosbridgeClient(Rosapi):
     def own_ends(self) -> OwnEnds:
         """The topics that rosbridge's node handles for us, and perhaps for other clients."""
         return OwnEnds(
-            node=NODE, publishes=frozenset(self._told), hears=frozenset(self._subscriptions)
+            node=NODE, publishes=frozenset(self._told), subscribes=frozenset(self._subscriptions)
         )
 
     async def wait_until_connected(self) -> None:

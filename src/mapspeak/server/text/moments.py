@@ -39,22 +39,20 @@ Period = tuple[datetime, datetime | None]
 """The first moment, and the first one after; None for a single moment."""
 
 
-def read_moment(
-    text: str | None, now: datetime | None, *, is_ahead: bool = False
-) -> datetime | None:
-    """Return the moment that is meant, in the zone of `now` where none is said.
+def read_moment(text: str | None, now: datetime | None) -> datetime | None:
+    """Return the moment to come that is meant, in the zone of `now` where none is said.
+
+    A span without a direction is counted from now on, and a time of day that is over is tomorrow's.
 
     Args:
         text: As `AHEAD` or `PAST` say, or "2h" without a direction; of a period such as
             "yesterday", its beginning. None for no moment.
         now: The operator's time, or another moment to count from; None where it is not known.
-        is_ahead: True where a span without a direction is counted from now on, and a time of day
-            that is over is tomorrow's.
 
     Raises:
         SemanticMapError: It is no moment, or counted from a clock that is not known.
     """
-    period = _read_period(text, now, is_ahead=is_ahead)
+    period = _read_period(text, now, is_ahead=True)
     return None if period is None else period[0]
 
 
@@ -82,10 +80,10 @@ def read_coming(
     Raises:
         SemanticMapError: As `read_moment`.
     """
-    start = read_moment(begins, now, is_ahead=True)
+    start = read_moment(begins, now)
     is_clock = ends is not None and _CLOCK.fullmatch(ends.strip()) is not None
     after = start if start is not None and is_clock else now
-    return start, read_moment(ends, after, is_ahead=True)
+    return start, read_moment(ends, after)
 
 
 def _read_period(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.ros.hearing import FrameLink, HeardFrames
+from mapspeak.ros.listening import FrameLink, HeardFrames
 from mapspeak.server.text.ros.listening import say_lag, say_rate
 from mapspeak.server.text.wording import list_some, say_count
 

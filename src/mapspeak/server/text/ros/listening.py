@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import anyio
 
 from mapspeak.ros.census import Census, Nodes
-from mapspeak.ros.hearing import Heard
+from mapspeak.ros.listening import Heard
 from mapspeak.ros.messages.fields import Dialect, Message, find_stamp
 from mapspeak.ros.port import EndQuality, NodeLinks, OwnEnds, RosConnection, RosGraph, TopicQuality
 from mapspeak.server.text.wording import list_some
@@ -164,15 +164,15 @@ def say_senders(topic: str, publishers: Nodes) -> str:
     return f"{topic} published by: {say_nodes(publishers)}{untold}"
 
 
-def say_ends(publishers: Nodes, hearers: Nodes) -> str:
+def say_ends(publishers: Nodes, subscribers: Nodes) -> str:
     """Name the nodes at both ends of a topic."""
-    return f"published by: {say_nodes(publishers)}\nheard by: {say_nodes(hearers)}"
+    return f"published by: {say_nodes(publishers)}\nheard by: {say_nodes(subscribers)}"
 
 
 def count_ends(census: Census, topic: str) -> str:
     """Say how many nodes are at both ends of a topic, and whether we are there too."""
-    publishers, hearers = census.publishers_of(topic), census.hearers_of(topic)
-    return f"published by {_count(publishers)}, heard by {_count(hearers)}"
+    publishers, subscribers = census.publishers_of(topic), census.subscribers_of(topic)
+    return f"published by {_count(publishers)}, heard by {_count(subscribers)}"
 
 
 def _count(nodes: Nodes) -> str:
@@ -186,7 +186,7 @@ def say_node(name: str, links: NodeLinks, own: OwnEnds) -> str:
     is_ours = bool(own.node) and name.endswith(f"/{own.node}")
     told = {
         "publishes": _mark_ours(links.publishes, own.publishes if is_ours else ()),
-        "hears": _mark_ours(links.subscribes, own.hears if is_ours else ()),
+        "hears": _mark_ours(links.subscribes, own.subscribes if is_ours else ()),
         "serves": links.serves,
     }
     lines = [
@@ -232,8 +232,10 @@ def _say_ends(ends: Sequence[EndQuality]) -> str:
 
 def say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:
     """Name the topics without a publisher or a subscriber, and the nodes that did not answer."""
-    unheard = {each: census.hearers_of(each).ours for each in topics}
-    unheard = {each: ours for each, ours in unheard.items() if not census.hearers_of(each).others}
+    unheard = {each: census.subscribers_of(each).ours for each in topics}
+    unheard = {
+        each: ours for each, ours in unheard.items() if not census.subscribers_of(each).others
+    }
     told = {
         "published by nobody": [each for each in topics if not census.publishers_of(each).others],
         "heard by nobody": [each for each, ours in unheard.items() if ours is None],

@@ -9,7 +9,7 @@ from mapspeak.ros.actions import ActionClient, open_action
 from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.definitions.types import Field
 from mapspeak.ros.messages.fields import Dialect, Message
-from mapspeak.server.text.ros.refusals import refuse_goal
+from mapspeak.server.text.ros.outcomes import refuse_goal
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry
 from mapspeak.server.tools.ros.publishing import Publisher
 from mapspeak.session import Session

@@ -10,11 +10,11 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.definitions.checking import check_message, describe_type
 from mapspeak.ros.definitions.texts import find_parts, kinds_of, known_definitions, split_parts
 from mapspeak.ros.definitions.types import Field, TypeBook, find_odd_lines, parse_definition
-from mapspeak.ros.hearing import Heard, hear
+from mapspeak.ros.listening import Heard, hear
 from mapspeak.ros.messages.fields import NAME, TYPE, Dialect, bare_type
 from mapspeak.ros.port import RosConnection, RosGraph, find_nearest
 from mapspeak.safety import Act, Call, GuardedConnection, Publish, SetParameter
-from mapspeak.server.text.ros.refusals import (
+from mapspeak.server.text.ros.outcomes import (
     KNOWN_TYPE,
     NO_NAME,
     NO_ROS,
@@ -221,7 +221,7 @@ class RosInquiry:
     async def hear(
         self, topic: str, type_name: str, *, n: int = 1, wait_s: float, duration_s: float = 0.0
     ) -> Heard:
-        """Listen to a topic of a type, "package/Type"; see `mapspeak.ros.hearing.hear`."""
+        """Listen to a topic of a type, "package/Type"; see `mapspeak.ros.listening.hear`."""
         return await hear(
             self.connection,
             topic,

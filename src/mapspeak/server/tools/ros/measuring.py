@@ -9,11 +9,11 @@ from pydantic import Field
 from mapspeak.errors import LinkError
 from mapspeak.ros.census import ask_each, fetch_publishers
 from mapspeak.ros.definitions.types import measure_message
-from mapspeak.ros.hearing import hear_frames
+from mapspeak.ros.listening import hear_frames
 from mapspeak.ros.messages.fields import Message
 from mapspeak.server.text.ros.frames import say_frames, say_transform
 from mapspeak.server.text.ros.listening import say_measured, say_senders, say_silent
-from mapspeak.server.text.ros.refusals import refuse_name
+from mapspeak.server.text.ros.outcomes import refuse_name
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name

@@ -17,12 +17,15 @@ from mapspeak.server.text.ros.listening import (
     page_of,
     say_node,
 )
-from mapspeak.server.text.ros.refusals import (
+from mapspeak.server.text.ros.outcomes import (
     NO_PARAMETER,
     NO_PARAMETER_TO_DELETE,
     OTHER_KIND,
+    READ_AT_START,
+    say_deleted,
+    say_new,
+    say_set,
 )
-from mapspeak.server.text.ros.sent import READ_AT_START, say_deleted, say_new, say_set
 from mapspeak.server.text.ros.values import cut, say_descriptor, say_kind, show_value
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name

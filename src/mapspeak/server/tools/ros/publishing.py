@@ -8,11 +8,11 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.hearing import hear_frames
+from mapspeak.ros.listening import hear_frames
 from mapspeak.ros.messages.fields import VELOCITIES, Message, bare_type
 from mapspeak.ros.port import find_nearest
 from mapspeak.safety import publishing_for, zero_velocity_of
-from mapspeak.server.text.ros.refusals import (
+from mapspeak.server.text.ros.outcomes import (
     CUT_OFF,
     CUT_OFF_MOVING,
     CUT_OFF_STANDING,
@@ -22,8 +22,6 @@ from mapspeak.server.text.ros.refusals import (
     NO_FRAME,
     PUBLICATION_UNDER_WAY,
     STOPPED_BEFORE,
-)
-from mapspeak.server.text.ros.sent import (
     UNTIL_DRIVE,
     UNTIL_STOPPED,
     say_going_on,

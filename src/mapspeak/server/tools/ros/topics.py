@@ -7,8 +7,8 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.census import Nodes, fetch_hearers, fetch_publishers, take_census
-from mapspeak.ros.hearing import Heard
+from mapspeak.ros.census import Nodes, fetch_publishers, fetch_subscribers, take_census
+from mapspeak.ros.listening import Heard
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
 from mapspeak.safety import Publish
 from mapspeak.server.text.ros.listening import (
@@ -25,13 +25,13 @@ from mapspeak.server.text.ros.listening import (
     say_silence,
     say_stamp,
 )
-from mapspeak.server.text.ros.refusals import (
+from mapspeak.server.text.ros.outcomes import (
     LOST_MEANWHILE,
     OTHER_TYPE,
     SILENT,
     UNPUBLISHED,
+    say_subscribers,
 )
-from mapspeak.server.text.ros.sent import say_hearers
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.ros.views import MOST_SUMMED, TOGETHER, MessageView, view_messages
 from mapspeak.server.tools.ros.goals import RosAccess
@@ -145,7 +145,7 @@ class TopicTools:
         name, connection = full_name(topic), self._inquiry.connection
         type_name = await self._inquiry.fetch_topic_type(name)
         publishers = await fetch_publishers(connection, name)
-        hearers = await fetch_hearers(connection, name)
+        subscribers = await fetch_subscribers(connection, name)
         dialect, link = await self._inquiry.fetch_dialect(), connection.link.kind
         quality = say_quality(connection.find_quality(name), dialect, link)
         try:
@@ -153,7 +153,7 @@ class TopicTools:
         except LinkError as error:
             fields = str(error)
         said = await self._inquiry.say_type(type_name)
-        ends = say_ends(publishers, hearers)
+        ends = say_ends(publishers, subscribers)
         return cut("\n".join([f"{name} {said}", ends, *quality, fields]))
 
     @tool(
@@ -231,10 +231,10 @@ class TopicTools:
         )
         said = await self._ros.publisher.publish(wanted)
         try:
-            hearers: Nodes | LinkError = await fetch_hearers(self._inquiry.connection, name)
+            subscribers: Nodes | LinkError = await fetch_subscribers(self._inquiry.connection, name)
         except LinkError as error:
-            hearers = error
-        return f"{said} {say_hearers(hearers)}"
+            subscribers = error
+        return f"{said} {say_subscribers(subscribers)}"
 
     async def _type_to_publish(self, topic: str, known: str | None, given: str | None) -> str:
         """Return the topic's own type; the one that was given only where there is no topic yet."""

@@ -10,7 +10,7 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError, MapspeakError, PolicyError
-from mapspeak.ros.census import fetch_hearers, fetch_publishers
+from mapspeak.ros.census import fetch_publishers, fetch_subscribers
 from mapspeak.ros.messages.fields import bare_type
 from mapspeak.ros.port import RosGraph
 from mapspeak.safety import GuardedConnection
@@ -170,7 +170,7 @@ class Exposure:
         connection = self._ros.inquiry.connection
         ends = {
             InterfaceKind.READ: await fetch_publishers(connection, topic),
-            InterfaceKind.PUBLISH: await fetch_hearers(connection, topic),
+            InterfaceKind.PUBLISH: await fetch_subscribers(connection, topic),
         }
         return [Interface(side, topic, bare_type(kind)) for side, end in ends.items() if end.others]
 
