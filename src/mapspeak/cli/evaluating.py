@@ -165,7 +165,7 @@ def _write_report(
     from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
 
-    log = write_log(folder, results, versions)
+    log = write_log(folder, results, versions, is_whole=True)
     click.echo(f"The trials can be replayed in {write_page(folder, results)}; the log is {log}.")
 
 
