@@ -13,7 +13,7 @@ from mapspeak.driving.drive import DriveBook
 from mapspeak.errors import LinkError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
-from mapspeak.safety import Caller, GuardedRobot, Policy, Surveyor, calling
+from mapspeak.safety import Caller, GuardedRobot, MapReviser, Policy, calling
 
 pytestmark = pytest.mark.anyio
 
@@ -71,8 +71,8 @@ class SlowRobot(FakeRobot):
 
 def guarded(robot: FakeRobot, folder: Path, policy: Policy | None = None) -> GuardedRobot:
     guard = make_guard(folder, policy)
-    surveyor = Surveyor(guard.policy.areas, wall_clock=guard.wall_clock)
-    return GuardedRobot(robot, guard=guard, surveyor=surveyor)
+    reviser = MapReviser(guard.policy.areas, wall_clock=guard.wall_clock)
+    return GuardedRobot(robot, guard=guard, reviser=reviser)
 
 
 async def test_a_drive_that_is_cancelled_while_a_leg_is_sent_goes_no_further(
