@@ -33,7 +33,7 @@ SNAPSHOT = ROOT / "tests" / "snapshots" / "tools.json"
 WITH_TABLES = (ROOT / "README.md",)
 TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
 SOURCES = {
-    "robot": ("links", "ros", "server/text/ros/refusals.py"),
+    "robot": ("links", "ros", "server/text/ros/outcomes.py"),
     "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
     "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
     "files": (
