@@ -13,6 +13,7 @@ from mapspeak.errors import ConfigError, PolicyError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Caller, Publish, calling
 from mapspeak.server.app import build_server
+from mapspeak.server.fleet import FleetServer
 from mapspeak.server.view.replay import MAPS, MapLog, replay_log
 from mapspeak.server.wire.calllog import CallLog
 from mapspeak.session import Session
@@ -44,7 +45,7 @@ async def test_a_call_log_is_replayed_with_pictures_and_poses(calls: Path) -> No
     assert look.call.pictures == ("calls/0001-0.png",)
     assert (look.pose, refused.call.is_error) == (None, True)
     assert pose.pose is not None
-    assert (pose.pose.x, pose.pose.y, pose.n_trail) == (1.5, 1.4, 1)
+    assert (pose.pose.x, pose.pose.y, pose.trail) == (1.5, 1.4, (0, 1))
     assert told.map is None
 
 
@@ -73,6 +74,40 @@ async def test_the_map_of_a_call_log_is_as_it_was_after_each_call(tmp_path: Path
     assert grown.overlay["doors"].names == []
     assert told.map is not None
     assert {name for row in grown.map.tiles for name in row} <= set(told.map.pictures or ())
+
+
+@pytest.mark.anyio
+async def test_a_log_of_several_robots_shows_each_step_on_the_map_of_its_robot(
+    tmp_path: Path,
+) -> None:
+    log, servers = CallLog(tmp_path / "calls.jsonl"), {}
+    for name, grid in {"hall": two_rooms(), "yard": grid_from_text(ROOM)}.items():
+        store = SemanticMapStore(tmp_path / f"{name}.yaml")
+        session = Session(FakeRobot(grid), store, lease_s=60.0, find_model=lambda: None)
+        maps = MapLog(session, log.pictures / MAPS / name, log.of(name))
+        servers[name] = build_server(session, call_log=maps)
+    async with Client(FleetServer(servers)) as client:
+        for robot, tool in (
+            ("hall", "get_robot_pose"),
+            ("yard", "look_at_map"),
+            ("hall", "look_at_map"),
+            ("yard", "get_robot_pose"),
+        ):
+            await client.call_tool(tool, {"robot": robot})
+    told = replay_log(log.path)
+    assert [step.call.note for step in told.steps] == ["hall", "yard", "hall", "yard"]
+    shown = [told.moments[step.n_moments - 1] for step in told.steps]
+    assert [each.overlay["doors"].names for each in shown] == [["D1"], [], ["D1"], []]
+    assert [each.map and each.map.n_cols for each in shown] == [30, 8, 30, 8]
+    assert [step.trail for step in told.steps] == [(0, 1), (1, 1), (0, 1), (1, 2)]
+
+
+def test_a_robot_that_is_named_like_another_folder_has_no_map(tmp_path: Path) -> None:
+    (tmp_path / "moments.jsonl").write_text("no json\n")
+    (tmp_path / "log" / MAPS).mkdir(parents=True)
+    path = tmp_path / "log.jsonl"
+    path.write_text(json.dumps({"tool": "look", "robot": "../.."}) + "\n")
+    assert not replay_log(path).moments
 
 
 @pytest.mark.anyio

@@ -118,11 +118,11 @@ def test_a_script_beside_the_papers_models_is_called_one(run: Path) -> None:
 
 def test_a_replay_shows_where_the_robot_stood_at_every_step(run: Path) -> None:
     steps = replay_of(run)["steps"]
-    assert [(s["pose"]["x"], s["pose"]["y"], s["at_s"], s["n_trail"]) for s in steps] == [
-        (1.0, 1.5, 0.0, 1),
-        (1.0, 1.5, 4.0, 3),
-        (1.0, 1.5, 4.0, 3),
-        (5.0, 1.5, 8.0, 6),
+    assert [(s["pose"]["x"], s["pose"]["y"], s["at_s"], s["trail"]) for s in steps] == [
+        (1.0, 1.5, 0.0, [0, 1]),
+        (1.0, 1.5, 4.0, [0, 3]),
+        (1.0, 1.5, 4.0, [0, 3]),
+        (5.0, 1.5, 8.0, [0, 6]),
     ]
 
 

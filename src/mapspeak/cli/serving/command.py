@@ -267,7 +267,7 @@ async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path)
     }
     sessions = {name: session for name, (session, _) in opened.items()}
     call_log = None if options.call_log is None else CallLog(options.call_log)
-    calls = {name: CallFeed(call_log) for name in sessions}
+    calls = {name: CallFeed(call_log and call_log.of(name)) for name in sessions}
     drawers, notes = open_drawing(
         opened,
         calls,
@@ -276,8 +276,9 @@ async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path)
         record=options.record,
         foxglove=options.foxglove,
     )
-    if call_log is not None and list(sessions) == [""]:
-        notes[""] = MapLog(sessions[""], call_log.pictures / MAPS, notes[""])
+    if call_log is not None:
+        maps = call_log.pictures / MAPS
+        notes = {name: MapLog(sessions[name], maps / name, note) for name, note in notes.items()}
     servers = {
         name: _build_server(session, options, notes[name]) for name, session in sessions.items()
     }

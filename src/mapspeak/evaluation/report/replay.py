@@ -161,7 +161,7 @@ def _steps(
             call=call,
             at_s=last.wall_s if robot_s is None else robot_s,
             pose=None if last.pose is None else PoseView.of(last.pose),
-            n_trail=sum(state.time_s <= (robot_s or 0.0) for state in states),
+            trail=(0, sum(state.time_s <= (robot_s or 0.0) for state in states)),
         )
         yield show_moments(step, moments, n_calls=n_calls)
 

@@ -107,7 +107,10 @@ class MapLog:
         is_new = grid is not self._grid
         before, now = self._overlay.model_dump(), overlay.model_dump()
         parts = {
-            name: _compare(before[name], part) for name, part in now.items() if part != before[name]
+            name: _compare(before[name], part)
+            for name, part in now.items()
+            # The first moment names every part: of several robots it follows another's last one.
+            if self._grid is None or part != before[name]
         }
         if not is_new and not parts:
             return
@@ -175,7 +178,8 @@ class StepView(ViewPart):
         at_s: Since the first.
         pose: Where the robot stood; None where it is not known.
         goal: Where it was sent.
-        n_trail: Points of the trail until then.
+        robot: Whose step it is, where there are several.
+        trail: From which to which point of the trail the robot had come.
         n_moments: Moments of the map until then.
     """
 
@@ -183,7 +187,8 @@ class StepView(ViewPart):
     at_s: float
     pose: PoseView | None = None
     goal: PoseView | None = None
-    n_trail: int = 0
+    robot: str = ""
+    trail: tuple[int, int] = (0, 0)
     n_moments: int = 0
 
 
@@ -232,20 +237,44 @@ def replay_log(path: Path, grid: OccupancyGrid | None = None) -> Replay:
     if first is None:
         raise ConfigError(f"{path} is empty.", hint="Give a log in which something was noted.")
     is_audit = "event" in first
-    moments, pictures = ((), {}) if is_audit else read_moments(path.with_suffix("") / MAPS)
-    steps = _steps_of_audit(read_audit(path)) if is_audit else _steps_of_calls(path)
-    shown, overlay = (None, Overlay()) if grid is None else show_map(grid)
-    told = list(steps)
-    if grid is None and moments:
-        shown = join_pictures(moments, pictures)
-        told = [show_moments(step, moments, n_calls=step.call.number) for step in told]
+    about = [("log", path.name), ("kind", "audit log" if is_audit else "call log")]
+    if is_audit:
+        told = _join_robots(list(_steps_of_audit(read_audit(path))), None)
+    else:
+        told = _join_robots(list(_steps_of_calls(path)), path.with_suffix("") / MAPS)
+    if grid is None:
+        return told.model_copy(update={"about": about})
+    shown, overlay = show_map(grid)
+    finished = {"about": about, "map": shown, "overlay": overlay, "moments": ()}
+    return told.model_copy(update=finished)
+
+
+def _join_robots(steps: Sequence[StepView], maps: Path | None) -> Replay:
+    """Return the replay of all robots; trail and moments of each follow those of the one before."""
+    trail: list[Spot] = []
+    moments: list[Moment] = []
+    pictures: dict[str, str] = {}
+    told: dict[int, StepView] = {}
+    # Names in a log are untrusted: only a folder that is there is read.
+    folders = {each.name: each for each in maps.glob("*/")} | {"": maps} if maps else {}
+    for robot in dict.fromkeys(step.robot for step in steps):
+        own = [step for step in steps if step.robot == robot]
+        kept, drawn = read_moments(folders[robot]) if robot in folders else ((), {})
+        n_before = len(trail)
+        for n_calls, step in enumerate(own, start=1):
+            if step.pose is not None:
+                trail.append((step.pose.x, step.pose.y))
+            come = step.model_copy(update={"trail": (n_before, len(trail))})
+            told[step.call.number] = show_moments(
+                come, kept, n_calls=n_calls, n_before=len(moments)
+            )
+        moments += kept
+        pictures |= drawn
     return Replay(
-        about=[("log", path.name), ("kind", "audit log" if is_audit else "call log")],
-        map=shown,
-        overlay=overlay,
-        moments=moments if grid is None else (),
-        trail=[(step.pose.x, step.pose.y) for step in told if step.pose is not None],
-        steps=told,
+        map=join_pictures(moments, pictures),
+        moments=moments,
+        trail=trail,
+        steps=[told[step.call.number] for step in steps],
     )
 
 
@@ -255,10 +284,16 @@ def join_pictures(moments: Sequence[Moment], pictures: Mapping[str, str]) -> Gri
     return None if latest is None else latest.model_copy(update={"pictures": pictures})
 
 
-def show_moments(step: StepView, moments: Sequence[Moment], *, n_calls: int) -> StepView:
-    """Return a step with the map as it was when that many calls had ended."""
+def show_moments(
+    step: StepView, moments: Sequence[Moment], *, n_calls: int, n_before: int = 0
+) -> StepView:
+    """Return a step with the map as it was when that many calls had ended.
+
+    Args:
+        n_before: Moments of other robots, which come before these.
+    """
     n_moments = sum(each.n_calls <= n_calls for each in moments)
-    return step.model_copy(update={"n_moments": n_moments})
+    return step.model_copy(update={"n_moments": n_moments and n_before + n_moments})
 
 
 def _read_lines(path: Path) -> Iterator[Mapping[str, Any]]:
@@ -284,11 +319,10 @@ def _read_lines(path: Path) -> Iterator[Mapping[str, Any]]:
 
 
 def _steps_of_calls(path: Path) -> Iterator[StepView]:
-    at_s, n_trail = 0.0, 0
+    at_s = 0.0
     for number, line in enumerate(_read_lines(path), start=1):
         at_s += _number(line.get("wall_s")) or 0.0
         pose = _find_pose(line.get("report"))
-        n_trail += pose is not None
         pictures = [str(name) for name in line.get("pictures") or ()]
         call = CallView(
             number=number,
@@ -297,8 +331,9 @@ def _steps_of_calls(path: Path) -> Iterator[StepView]:
             is_error=bool(line.get("is_error")),
             text=str(line.get("text", "")),
             pictures=tuple(locate_pictures(pictures, path.with_suffix(""))),
+            note=(robot := str(line.get("robot", ""))),
         )
-        yield StepView(call=call, at_s=round(at_s, 2), pose=pose, n_trail=n_trail)
+        yield StepView(call=call, at_s=round(at_s, 2), pose=pose, robot=robot)
 
 
 def locate_pictures(names: Iterable[str], folder: Path) -> Iterator[str]:
@@ -349,5 +384,6 @@ def _steps_of_audit(lines: Iterable[AuditLine]) -> Iterator[StepView]:
         yield StepView(
             call=call,
             at_s=round((at - begun).total_seconds(), 2),
+            robot=line.robot,
             goal=None if None in goal else PoseView.of(Pose(x, y, yaw_rad)),
         )

@@ -5,10 +5,12 @@ clients that keep no log of their own.
 """
 
 import base64
+import itertools
 import json
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -43,19 +45,26 @@ class CallNoting(Protocol):
 class CallLog:
     """Writes one file; a call's line is there before its answer leaves the server.
 
-    A line has: number, tool, arguments, text, is_error, report, pictures (file names in the folder
-    that is called as the file is, without its ending) and wall_s.
+    A line has: number, robot ("" for an only one), tool, arguments, text, is_error, report, pictures
+    (file names in the folder that is called as the file is, without its ending) and wall_s.
 
     Attributes:
         path: The file; its folder is made, and what it held is lost.
     """
 
     path: Path
-    _n_calls: int = field(default=0, init=False)
+    _robot: str = field(default="", init=False)
+    _numbers: Iterator[int] = field(default_factory=lambda: itertools.count(1), init=False)
 
     def __post_init__(self) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.write_bytes(b"")
+
+    def of(self, robot: str) -> "CallLog":
+        """Return the same log for the calls of one robot, whose lines name it."""
+        own = copy(self)
+        own._robot = robot
+        return own
 
     @property
     def pictures(self) -> Path:
@@ -66,13 +75,13 @@ class CallLog:
     def noting(self, tool: str, arguments: dict[str, Any]) -> Iterator[CallNote]:
         """Note a call when it has come to its end, however that is."""
         note, begun_s = CallNote(error="It came to no answer."), time.monotonic()
-        self._n_calls += 1
-        number = self._n_calls
+        number = next(self._numbers)
         try:
             yield note
         finally:
             line = {
                 "number": number,
+                "robot": self._robot,
                 "tool": tool,
                 "arguments": arguments,
                 **self._read(note, number),

@@ -4,7 +4,7 @@
 
 /**
  * @typedef {{call: Call, at_s: number, pose: {x: number, y: number, yaw_deg: number} | null,
- *   goal: {x: number, y: number, yaw_deg: number} | null, n_trail: number, n_moments: number}} Step
+ *   goal: {x: number, y: number, yaw_deg: number} | null, robot: string, trail: [number, number], n_moments: number}} Step
  */
 
 const LONGEST_S = 4;
@@ -27,8 +27,6 @@ class Replay {
     this.steps = told.steps;
     this.trail = told.trail;
     this.now = 0;
-    /** @type {Step["pose"]} */
-    this.pose = null;
     this.timer = 0;
     this.map = new MapView(byId("map"), { index: byId("items") });
     this.calls = new Calls(byId("calls"), { isNewestFirst: false, most: Infinity });
@@ -109,13 +107,14 @@ class Replay {
     row?.scrollIntoView({ block: "nearest" });
     byId("slider").value = String(this.now);
     byId("step").textContent = `${this.now + 1} of ${this.steps.length}`;
-    const { pose } = step;
+    const { pose, robot } = step;
     const stood = pose ? ` at x ${pose.x.toFixed(2)}, y ${pose.y.toFixed(2)}, ${pose.yaw_deg.toFixed(0)}°` : "";
-    byId("state").textContent = `${step.at_s.toFixed(1)} s${stood}`;
+    byId("state").textContent = `${robot && `${legible(robot)}: `}${step.at_s.toFixed(1)} s${stood}`;
     this.showMoment(step.n_moments);
-    this.map.showTrail(this.trail.slice(0, step.n_trail));
-    this.map.showRobot({ pose: pose ?? this.pose, goal: step.goal });
-    this.pose = pose ?? this.pose;
+    this.map.showTrail(this.trail.slice(...step.trail));
+    const last = this.latest((each) => each.pose)?.pose;
+    if (!last) this.map.layers.robot.clearLayers();
+    this.map.showRobot({ pose: last, goal: step.goal });
     this.showSeen();
   }
 
@@ -128,9 +127,15 @@ class Replay {
     this.shown = index;
   }
 
+  /** Return the latest step by now of the same robot that has something. @param {(step: Step) => any} has */
+  latest(has) {
+    const { robot } = this.steps[this.now];
+    return this.steps.slice(0, this.now + 1).reverse().find((step) => step.robot === robot && has(step));
+  }
+
   /** Show the picture that was seen last. */
   showSeen() {
-    const seen = this.steps.slice(0, this.now + 1).reverse().find((step) => step.call.pictures.length);
+    const seen = this.latest((step) => step.call.pictures.length);
     const name = seen?.call.pictures.at(-1);
     const said = seen ? `seen in step ${seen.call.number}` : "nothing seen yet";
     byId("seen").textContent = said;
