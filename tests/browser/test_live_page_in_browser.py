@@ -120,15 +120,25 @@ async def test_a_person_chooses_a_camera(tmp_path: Path) -> None:
 async def test_what_navigation_plans_is_a_layer_that_a_person_switches_on(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     path = (Point(1.5, 1.5), Point(3.0, 1.5))
-    robot.navigation = (NavigationLook(part=NavigationPart.PLAN, age_s=0.4, lines=(path,)),)
+    edge = tuple(
+        Point(x, y) for x, y in ((1.3, 1.2), (1.7, 1.2), (1.7, 1.6), (1.3, 1.6), (1.3, 1.2))
+    )
+    robot.navigation = (
+        NavigationLook(part=NavigationPart.PLAN, age_s=0.4, lines=(path,)),
+        NavigationLook(part=NavigationPart.FOOTPRINT, age_s=0.1, lines=(edge,)),
+    )
     async with serve_live(tmp_path, robot) as live, browse(live.address) as page:
-        note, drawn = page.locator("#navigation"), page.locator('path[stroke="#009e73"]')
+        note, drawn = page.locator("#navigation"), page.locator("path.plan")
         await expect(page.locator("#state")).to_contain_text("x 1.50")
         await expect(note).to_be_hidden()
         await page.hover(".leaflet-control-layers")
         await page.get_by_label("navigation").check()
         await expect(note).to_contain_text("planned path 1.5 m long")
-        await expect(drawn).to_have_count(1)
+        await expect(drawn).to_have_css("stroke", "rgb(0, 158, 115)")
+        # The robot's arrow does not hide where its edge is.
+        box = await page.locator("path.footprint").bounding_box()
+        on_top = "([x, y]) => document.elementFromPoint(x, y).classList.contains('footprint')"
+        assert await page.evaluate(on_top, [box["x"] + 1, box["y"] + box["height"] / 2])
         robot.navigation = ()
         await expect(note).to_contain_text("publishes no planned path")
         await expect(drawn).to_have_count(0)

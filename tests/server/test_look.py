@@ -173,13 +173,27 @@ async def test_what_the_robots_navigation_plans_is_drawn_on_request_with_its_age
     assert "footprint has told nothing yet" in told
     assert "in the frame 'odom', which TF does not join to the map" in told
     assert "it publishes no global costmap." in told
-    assert "the path green" in told
     assert "publishes no planned path, no footprint" in text_of(nothing)
     green = (0, 158, 115)
-    for result, is_drawn in ((shown, True), (nothing, False)):
-        png = base64.b64decode(pictures_of(result)[0].data)
-        pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
-        assert (pixels == green).all(axis=2).any() == is_drawn
+    assert (n_pixels(shown, green) > 0, n_pixels(nothing, green)) == (True, 0)
+
+
+async def test_the_robots_arrow_does_not_hide_its_footprint(tmp_path: Path) -> None:
+    robot, vermilion = FakeRobot(two_rooms()), (213, 94, 0)
+    across = (Point(1.3, 1.4), Point(1.7, 1.4))
+    async with connect(robot, tmp_path) as client:
+        bare = await client.call_tool("look_at_map", {"layers": ["navigation"]})
+        robot.navigation = (
+            NavigationLook(part=NavigationPart.FOOTPRINT, age_s=0.1, lines=(across,)),
+        )
+        shown = await client.call_tool("look_at_map", {"layers": ["navigation"], "full": True})
+    assert n_pixels(shown, vermilion) < n_pixels(bare, vermilion)
+
+
+def n_pixels(result: CallToolResult, colour: tuple[int, int, int]) -> int:
+    png = base64.b64decode(pictures_of(result)[0].data)
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+    return int((pixels == colour).all(axis=2).sum())
 
 
 async def test_what_the_robots_detector_reports_stands_beside_the_picture(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from mapspeak.geometry import Point
 from mapspeak.robot import NavigationPart
 from mapspeak.server.text.wording import list_some, say_area
 from mapspeak.server.text.world.look import Layer, MapLook, MapView
+from mapspeak.server.text.world.maps import NAVIGATION_PARTS
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,
@@ -57,6 +58,12 @@ def _say_placement(grid: OccupancyGrid, picture: MapPicture) -> str:
     )
 
 
+NAVIGATION_COLOURS = {
+    NavigationPart.PLAN: Colour.GREEN,
+    NavigationPart.FOOTPRINT: Colour.INK,
+    NavigationPart.GLOBAL_COSTMAP: Colour.ORANGE,
+    NavigationPart.LOCAL_COSTMAP: Colour.SKY,
+}
 LEGEND = (
     LegendEntry(sample=LegendSample.PLAIN_REGION, text="room"),
     LegendEntry(sample=LegendSample.HATCHED_REGION, text="corridor"),
@@ -69,6 +76,13 @@ LEGEND = (
     LegendEntry(sample=LegendSample.ROBOT, text="robot"),
     LegendEntry(sample=LineStyle.DASHED, text="way to the best frontier"),
     LegendEntry(sample=LegendSample.ORIGIN, text="origin"),
+    *(
+        LegendEntry(sample=LineStyle.SOLID, text=text, colour=colour)
+        for colour, text in {
+            Colour.PURPLE: "wall that no picture shows",
+            **{NAVIGATION_COLOURS[part]: name for part, name in NAVIGATION_PARTS.items()},
+        }.items()
+    ),
 )
 GREYS = "White free, grey unknown, black walls; the legend below the map explains the rest."
 
@@ -121,13 +135,8 @@ def draw_world(view: MapView) -> WorldPicture:
     parts = [_caption(picture)]
     if look.up_rad != NORTH_UP_RAD:
         parts.append(f"Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot.")
-    if view.unseen is not None:
-        parts.append("Purple lines are walls that no picture shows.")
     if view.navigation:
-        parts.append(
-            "Of the robot's navigation: the path green, the footprint vermilion, around what the "
-            "middle of the robot may not touch orange (global costmap) and sky blue (local)."
-        )
+        parts.append("Costmaps: lines around what the middle of the robot may not touch.")
     if Layer.DOORS in look.layers and not is_detailed:
         parts.append("An overview without doors and areas: zoom in with around and radius_m.")
     return WorldPicture(png=picture.png, caption=" ".join(parts))
@@ -239,17 +248,13 @@ def _unseen_walls(view: MapView) -> tuple[Line, ...]:
     )
 
 
-NAVIGATION_COLOURS = {
-    NavigationPart.PLAN: Colour.GREEN,
-    NavigationPart.FOOTPRINT: Colour.VERMILION,
-    NavigationPart.GLOBAL_COSTMAP: Colour.ORANGE,
-    NavigationPart.LOCAL_COSTMAP: Colour.SKY,
-}
-
-
 def _navigation(view: MapView) -> tuple[Line, ...]:
     return tuple(
-        Line(points=line, colour=NAVIGATION_COLOURS[look.part])
+        Line(
+            points=line,
+            colour=NAVIGATION_COLOURS[look.part],
+            is_over_robot=look.part is NavigationPart.FOOTPRINT,
+        )
         for look in view.navigation or ()
         for line in look.lines
         if len(line) > 1

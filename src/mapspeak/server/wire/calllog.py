@@ -45,15 +45,16 @@ class CallNoting(Protocol):
 class CallLog:
     """Writes one file; a call's line is there before its answer leaves the server.
 
-    A line has: number, robot ("" for an only one), tool, arguments, text, is_error, report, pictures
-    (file names in the folder that is called as the file is, without its ending) and wall_s.
+    A line has: number, robot, tool, arguments, text, is_error, report, pictures (file names in the
+    folder that is called as the file is, without its ending) and wall_s.
 
     Attributes:
         path: The file; its folder is made, and what it held is lost.
+        robot: Whose calls are noted; "" for an only one.
     """
 
     path: Path
-    _robot: str = field(default="", init=False)
+    robot: str = ""
     _numbers: Iterator[int] = field(default_factory=lambda: itertools.count(1), init=False)
 
     def __post_init__(self) -> None:
@@ -63,7 +64,7 @@ class CallLog:
     def of(self, robot: str) -> "CallLog":
         """Return the same log for the calls of one robot, whose lines name it."""
         own = copy(self)
-        own._robot = robot
+        own.robot = robot
         return own
 
     @property
@@ -81,7 +82,7 @@ class CallLog:
         finally:
             line = {
                 "number": number,
-                "robot": self._robot,
+                "robot": self.robot,
                 "tool": tool,
                 "arguments": arguments,
                 **self._read(note, number),

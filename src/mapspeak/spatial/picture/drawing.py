@@ -3,6 +3,7 @@
 import io
 import itertools
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +31,7 @@ from mapspeak.spatial.picture.marks import (
     UNKNOWN_GROUND,
     WALL,
     Canvas,
+    Line,
     MapLayers,
     Mark,
     PictureRegion,
@@ -270,9 +272,7 @@ def _draw_symbols(
         labels: Those of zones and regions.
         regions: The region of each pixel.
     """
-    for line in shown.lines:
-        for run in ink.find_runs(view, line):
-            ink.draw_run(inside, run, line.style, line.colour, width_px=line.width_px)
+    _draw_lines(inside, view, [line for line in shown.lines if not line.is_over_robot])
     places = view.area_pixels_at(_points_of(shown.marks))
     symbols = [
         (mark.shape, mark.colour, place)
@@ -293,5 +293,12 @@ def _draw_symbols(
         ink.draw_shape(inside, place, shape, colour)
     if robot is not None:
         ink.draw_arrow(inside, at, view.heading_at(robot.yaw_rad))
+    _draw_lines(inside, view, [line for line in shown.lines if line.is_over_robot])
     draw_texts(inside, placed)
     return left_out
+
+
+def _draw_lines(inside: Canvas, view: PictureView, lines: Iterable[Line]) -> None:
+    for line in lines:
+        for run in ink.find_runs(view, line):
+            ink.draw_run(inside, run, line.style, line.colour, width_px=line.width_px)

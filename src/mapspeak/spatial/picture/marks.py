@@ -185,12 +185,14 @@ class Line:
 
     Attributes:
         width_px: Its thickness in the picture.
+        is_over_robot: The robot's arrow does not hide it.
     """
 
     points: tuple[Point, ...]
     style: LineStyle = LineStyle.SOLID
     colour: Colour = Colour.BLUE
     width_px: int = 3
+    is_over_robot: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

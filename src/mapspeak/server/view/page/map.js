@@ -16,8 +16,8 @@ const NAMES_FROM_PX_PER_M = 12;
 /** From here on doors, frontiers, places and things have their names beside them. */
 const ALL_NAMES_FROM_PX_PER_M = 45;
 const MARKS = { rooms: "▰", closed: "▰", doors: "●", frontiers: "○", things: "●", places: "●", trail: "—", path: "┅" };
-/** Colours of the parts of the robot's navigation, as in the picture of look_at_map. @type {Record<string, string>} */
-const NAVIGATION = { plan: "#009e73", footprint: "#d55e00", global_costmap: "#e69f00", local_costmap: "#56b4e9" };
+/** What the robot's navigation tells of itself; view.css has the colours, those of look_at_map. */
+const NAVIGATION = ["plan", "footprint", "global_costmap", "local_costmap"];
 /** Places no farther apart share their name on the map. */
 const STACK_M = 0.5;
 const TRAIL_M = 0.25;
@@ -71,6 +71,8 @@ class MapView {
     L.control.scale({ imperial: false }).addTo(this.map);
     this.tiles = new Map();
     this.tilePane = L.layerGroup().addTo(this.map);
+    // Over the robot's arrow, which is larger than its footprint until a person zooms in.
+    this.map.createPane("over").style.zIndex = "620";
     const layer = () => L.layerGroup().addTo(this.map);
     this.layers = { rooms: layer(), closed: layer(), doors: layer(), frontiers: layer(),
       things: layer(), places: layer(), trail: layer(), path: layer(), robot: layer(), navigation: L.layerGroup() };
@@ -302,7 +304,8 @@ class MapView {
 
   /** Let a person switch on what the robot's navigation tells of itself. */
   offerNavigation() {
-    this.switches.addOverlay(this.layers.navigation, '<span class="mark navigation">▱</span> navigation');
+    const signs = NAVIGATION.map((part) => `<br><span class="sign mark ${part}">▱</span> ${part.replace("_", " ")}`);
+    this.switches.addOverlay(this.layers.navigation, `navigation${signs.join("")}`);
   }
 
   /** Draw what the robot's navigation tells of itself. @param {{part: string, said: string, lines: number[][][]}[]} parts */
@@ -310,7 +313,7 @@ class MapView {
     const layer = this.layers.navigation.clearLayers();
     for (const { part, said, lines } of parts) {
       for (const line of lines) {
-        L.polyline(line.map((at) => this.place(at)), { color: NAVIGATION[part], weight: 2 })
+        L.polyline(line.map((at) => this.place(at)), { className: part, weight: 2, pane: "over" })
           .bindTooltip(plain(said), { sticky: true }).addTo(layer);
       }
     }
