@@ -1,3 +1,4 @@
+import gc
 import itertools
 import math
 from collections.abc import Callable
@@ -27,7 +28,12 @@ FLOOR = MapRevision(grid_from_text("....\n....", resolution_m=3.0), radius_m=RAD
 
 def watching() -> Callable[..., Cause | None]:
     monitor = KeepOutMonitor()
-    return lambda here, *, now_s: monitor.judge(FLOOR, here, now_s=now_s, mover=Mover.OTHERS)
+
+    def watch(here: Pose, *, now_s: float, told_s: float | None = None) -> Cause | None:
+        stamped = StampedPose(here, now_s if told_s is None else told_s)
+        return monitor.judge(FLOOR, stamped, now_s=now_s, mover=Mover.OTHERS)
+
+    return watch
 
 
 def judge(
@@ -63,6 +69,34 @@ def test_a_robot_is_stopped_early_enough_to_brake_and_not_much_earlier(
     # It hears of the stop a little later, and brakes then.
     left_m = PIT.distance_to(stopped) - 0.2 * speed_mps - speed_mps**2 / 2
     assert RADIUS_M <= left_m <= RADIUS_M + MARGIN_M + 2 * every_s * speed_mps
+
+
+@pytest.mark.parametrize("n_looks", [2, 4, 10, 20])
+@pytest.mark.parametrize("speed_mps", [0.1, 0.3, 0.5, 0.8])
+def test_a_robot_that_tells_its_pose_rarely_is_stopped_as_well(
+    speed_mps: float, n_looks: int
+) -> None:
+    watch = watching()
+    for tick in range(10_000):
+        told_s = tick // n_looks * n_looks * 0.05
+        here = Pose(1.0 + speed_mps * told_s, 1.0)
+        if watch(here, now_s=tick * 0.05, told_s=told_s):
+            break
+    stopped = Point(1.0 + speed_mps * tick * 0.05, 1.0)
+    left_m = PIT.distance_to(stopped) - 0.2 * speed_mps - speed_mps**2 / 2
+    assert RADIUS_M <= left_m <= RADIUS_M + MARGIN_M + 2 * n_looks * 0.05 * speed_mps
+
+
+def test_areas_that_are_there_no_more_are_forgotten() -> None:
+    monitor = KeepOutMonitor()
+    here = StampedPose(Pose(1.0, 1.0), 0.0)
+    for number in range(50):
+        area = ClosedArea(name=f"pit {number}", outline=PIT.outline)
+        revision = FLOOR.with_areas((area,), ())
+        monitor.judge(revision, here, now_s=number / 10, mover=Mover.OTHERS)
+        del area, revision
+    known = [each for each in gc.get_objects() if isinstance(each, ClosedArea)]
+    assert sum(each.name.startswith("pit ") for each in known) == 1
 
 
 def test_a_robot_that_comes_to_a_stand_where_goals_may_be_is_let_go() -> None:
@@ -157,8 +191,9 @@ def test_a_pose_that_localisation_corrects_is_no_speed() -> None:
 @pytest.mark.parametrize("mover", Mover)
 def test_who_is_told_of_a_stop_is_told_what_drove_the_robot(mover: Mover) -> None:
     monitor = KeepOutMonitor()
-    monitor.begin_at(Pose(4.6, 1.0), now_s=0.0)
-    said = monitor.judge(FLOOR, Pose(4.68, 1.0), now_s=0.2, mover=mover)
+    monitor.begin_at(StampedPose(Pose(4.6, 1.0), 0.0), now_s=0.0)
+    here = StampedPose(Pose(4.68, 1.0), 0.2)
+    said = monitor.judge(FLOOR, here, now_s=0.2, mover=mover)
     assert said is not None
     assert (said.code, said.name) == (AT_AREA[mover], "keep-out area 'pit'")
 

@@ -310,16 +310,16 @@ class GuardedRobot:
         if revision is None or not revision.areas:
             return None
         try:
-            pose = (await self._robot.fetch_pose()).pose
+            here = await self._robot.fetch_pose()
         except LinkError as error:
             blind_s = anyio.current_time() - self._seen_at_s
             if mover is not Mover.NAVIGATION or blind_s < BLIND_S:
                 return None
             return Cause(code=CauseCode.POSE_UNKNOWN, after_s=blind_s, quote=str(error))
         self._seen_at_s = anyio.current_time()
-        fault = self._monitor.judge(revision, pose, now_s=self.now_s, mover=mover)
+        fault = self._monitor.judge(revision, here, now_s=self.now_s, mover=mover)
         if fault is not None:
-            self._monitor.begin_at(pose, now_s=self.now_s)
+            self._monitor.begin_at(here, now_s=self.now_s)
         return fault
 
     async def _end(self, drive: GuardedDrive, state: GoalState, cause: Cause) -> None:

@@ -9,7 +9,7 @@ import anyio
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.hold import Hold
-from mapspeak.robot import Cause, CauseCode, Robot
+from mapspeak.robot import Cause, CauseCode, Robot, StampedPose
 from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -77,22 +77,26 @@ class KeepOutMonitor:
     """Watches a robot, whatever moves it, for the closed areas ahead; judges what it is told."""
 
     def __init__(self) -> None:
-        self._before: tuple[Pose, float] | None = None
+        self._before: tuple[StampedPose, float] | None = None
         self._least_m: dict[ClosedArea, float] = {}
 
-    def begin_at(self, here: Pose, *, now_s: float) -> None:
+    def begin_at(self, here: StampedPose, *, now_s: float) -> None:
         """Begin anew where the robot stands: what it came too near to before is forgotten."""
         self._before = (here, now_s)
         self._least_m = {}
 
     def judge(
-        self, revision: MapRevision, here: Pose, *, now_s: float, mover: Mover
+        self, revision: MapRevision, stamped: StampedPose, *, now_s: float, mover: Mover
     ) -> Cause | None:
         """Return which closed area the robot is about to enter; None when it enters none.
 
         A robot already too close may move along or away from the area, never closer.
         """
-        way = (here.point, *self._find_way_to_stand(here, now_s))
+        here = stamped.pose
+        way = (here.point, *self._find_way_to_stand(stamped, now_s))
+        self._least_m = {
+            area: self._least_m[area] for area in revision.areas if area in self._least_m
+        }
         for area in revision.areas:
             left_m = area.distance_to_border(here.point)
             least_m = self._find_least(area, min(revision.radius_m + KEEP_M, left_m - WAVER_M))
@@ -106,16 +110,17 @@ class KeepOutMonitor:
         self._least_m[area] = max(least_m, self._least_m.get(area, least_m))
         return self._least_m[area]
 
-    def _find_way_to_stand(self, here: Pose, now_s: float) -> tuple[Point, ...]:
+    def _find_way_to_stand(self, stamped: StampedPose, now_s: float) -> tuple[Point, ...]:
         """Return the way that the robot would still go if the next look told it to stop."""
-        before, self._before = self._before, (here, now_s)
+        before, self._before = self._before, (stamped, now_s)
         if before is None:
             return ()
-        then, then_s = before
-        passed_s = now_s - then_s
-        if passed_s < LEAST_STEP_S:
+        passed_s = now_s - before[1]
+        if passed_s < LEAST_STEP_S or stamped == before[0]:
+            # The pose that is told next may be older than one look.
             self._before = before
             return ()
+        then, here = before[0].pose, stamped.pose
         moved_m = then.point.distance_to(here.point)
         if passed_s > LOST_TRACK_S or moved_m <= WAVER_M:
             return ()

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
-from mapspeak.robot import GoalStatus, Robot
+from mapspeak.robot import GoalStatus, Robot, StampedPose
 from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, read_number, refuse
 from mapspeak.safety.guard import MapReviser, Permit
 from mapspeak.safety.monitor import KEEP_M, GoalMonitor
@@ -187,7 +187,7 @@ class Plan:
 
     check: GoalCheck
     legs: tuple[Pose, ...]
-    here: Pose
+    here: StampedPose
 
 
 class Planner:
@@ -220,10 +220,10 @@ class Planner:
     async def plan(self, goal: Pose) -> Plan:
         """Check a goal, and find the legs by which the robot would get there."""
         revision, here = await self._look()
-        check = await anyio.to_thread.run_sync(_check, revision, here, goal)
+        check = await anyio.to_thread.run_sync(_check, revision, here.pose, goal)
         legs: tuple[Pose, ...] = (goal,)
         if check.is_ok and check.path_m:
-            legs = await anyio.to_thread.run_sync(plan_legs, revision, here.point, goal)
+            legs = await anyio.to_thread.run_sync(plan_legs, revision, here.pose.point, goal)
         return Plan(check=check, legs=legs, here=here)
 
     async def judge_message(self, message: Message) -> Refused | None:
@@ -245,7 +245,7 @@ class Planner:
         if not goals:
             return None
         revision, here = await self._look()
-        return await anyio.to_thread.run_sync(self._judge_all, revision, here, goals)
+        return await anyio.to_thread.run_sync(self._judge_all, revision, here.pose, goals)
 
     def _judge_all(
         self, revision: MapRevision, here: Pose, goals: Sequence[Pose]
@@ -253,8 +253,8 @@ class Planner:
         judged = (judge_check(_check(revision, here, goal), self._policy) for goal in goals)
         return next((each for each in judged if each is not None), None)
 
-    async def _look(self) -> tuple[MapRevision, Pose]:
-        here = (await self._robot.fetch_pose()).pose
+    async def _look(self) -> tuple[MapRevision, StampedPose]:
+        here = await self._robot.fetch_pose()
         return await self.revise(), here
 
 
