@@ -330,6 +330,7 @@ class Session:
         self.memory.meet(grid)
         if self.keeper.n_maps != n_before:
             self.pictures.forget()
+            self._tries.forget(self.drives.ended)
 
     def _recall_if_possible(self, grid: OccupancyGrid) -> SemanticMap:
         """Return what is remembered; a broken file costs the memory, not the map."""

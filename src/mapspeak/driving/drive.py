@@ -187,45 +187,45 @@ class DriveBook:
 
         Cancelling the wait cancels the drive and stops the robot.
         """
-        if goal_id is None and self._drives:
-            goal_id = self._find(None).goal_id
+        if self._drives:
+            goal_id = self._find(goal_id).goal_id
         try:
             return await self._wait(goal_id, wait_s, on_progress)
         except anyio.get_cancelled_exc_class():
             with anyio.CancelScope(shield=True):
-                await self._abandon(goal_id)
+                await self.abandon(goal_id)
             raise
 
     async def _wait(
         self, goal_id: str | None, wait_s: float, on_progress: OnProgress
     ) -> DriveReport:
-        deadline_s = self._robot.now_s + wait_s
-        next_progress_s = self._robot.now_s + PROGRESS_S
+        waited_s, told_s, before_s = 0.0, 0.0, self._robot.now_s
         report = await self.report(goal_id)
-        while not report.status.state.is_final and self._robot.now_s < deadline_s:
-            left_s = deadline_s - self._robot.now_s
+        while not report.status.state.is_final and waited_s < wait_s:
             try:
-                await self._robot.sleep(min(POLL_S, max(left_s, 0.01)))
+                await self._robot.sleep(pause_s := min(POLL_S, max(wait_s - waited_s, 0.01)))
             except LinkError:
                 # The robot's clock stands: its time would be waited for without end.
                 return await self.report(report.drive.goal_id)
             await self._start_next()
             report = await self.report(report.drive.goal_id)
-            if self._robot.now_s >= next_progress_s:
-                next_progress_s += PROGRESS_S
+            # A simulation that is begun anew sets its clock back.
+            waited_s += max(self._robot.now_s - before_s, pause_s)
+            before_s = self._robot.now_s
+            if waited_s - told_s >= PROGRESS_S:
+                told_s = waited_s
                 await on_progress(report)
         return report
 
-    async def _abandon(self, goal_id: str | None) -> None:
+    async def abandon(self, goal_id: str | None) -> None:
         """End a drive whose caller gave up; if the robot is out of reach, once it is back."""
-        if goal_id is None:
+        if goal_id not in self._drives:
             return
-        drive = self._find(goal_id)
         try:
-            await self.cancel(drive.goal_id)
+            await self.cancel(goal_id)
         except LinkError as error:
-            logger.warning("%s could not be cancelled yet: %s", drive.goal_id, error)
-            self._owed.owe(drive.goal_id)
+            logger.warning("%s could not be cancelled yet: %s", goal_id, error)
+            self._owed.owe(goal_id)
 
     async def cancel(self, goal_id: str | None = None) -> DriveReport:
         """End a drive; one that has already ended is reported as it ended.

@@ -145,6 +145,11 @@ class FrontierTries:
         self._blocked = BlockedPlaces()
         self._gaps: list[ProvedGap] = []
 
+    def forget(self, ended: Iterable[Drive]) -> None:
+        """Begin anew on another map, of which the drives that have ended tell nothing."""
+        self._learned.update(each.goal_id for each in ended)
+        self._looked_from, self._blocked, self._gaps = [], BlockedPlaces(), []
+
     def learn(self, ended: Iterable[Drive], revision: MapRevision, robot: Pose) -> None:
         """Take in the drives that have ended.
 

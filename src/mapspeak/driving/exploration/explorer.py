@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
@@ -94,12 +95,12 @@ class Explorer:
         Raises:
             PolicyError: The robot must not drive now, to any goal; it is stopped.
         """
-        if not self.is_going_on:
-            self._trips.begin_count()
-            self._paused_at, self._elapsed_s, self._bounds = None, 0.0, Bounds()
-            self._told_ratio = None
-        self._bounds = bounds or self._bounds
-        async with self._trips.given_up_with_call():
+        async with self._trips.one_call():
+            if not self.is_going_on:
+                self._trips.begin_count()
+                self._paused_at, self._elapsed_s, self._bounds = None, 0.0, Bounds()
+                self._told_ratio = None
+            self._bounds = bounds or self._bounds
             return await self._advance(wait_s, on_trip, client)
 
     async def _advance(self, wait_s: float, on_trip: OnProgress, client: str) -> Progress:
@@ -108,7 +109,8 @@ class Explorer:
             with self._site.drives.preparing() as ticket:
                 world = await self._site.fetch_world_model()
                 await self._look_on_the_way(world)
-                if (bound := self._bound_reached(world)) is not None:
+                bound = await self._site.compute(partial(self._bound_reached, world))
+                if bound is not None:
                     await self._trips.give_up(is_seen=bound is not BoundKind.DURATION)
                     return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
                 if (seen_id := self._find_seen_from_here(world)) is not None:
@@ -118,7 +120,8 @@ class Explorer:
                     return await self._end(world, ExplorationState.AT_GOAL, seen_id=seen_id)
                 state = await self._choose(world, ticket, client)
             if state is None:
-                return await self._end(world, judge_end(world, self._blocked(world)))
+                judge = partial(judge_end, world, self._blocked(world))
+                return await self._end(world, await self._site.compute(judge))
             if state is TripState.UNDER_WAY:
                 state = await self._trips.follow(
                     until_s=begun_s + wait_s, grid=world.grid, on_trip=on_trip
@@ -127,7 +130,8 @@ class Explorer:
                 await self._take_picture()
             spent_s = self._site.robot.now_s - begun_s
             self._elapsed_s = before_s + spent_s
-            ended = self._after(state, is_late=spent_s >= wait_s - SLACK_S)
+            # A simulation that is begun anew sets its clock back.
+            ended = self._after(state, is_late=not 0.0 <= spent_s < wait_s - SLACK_S)
             if ended is ExplorationState.AT_GOAL:
                 await turn_for_picture(self._site, client=client, on_progress=on_trip)
             if ended is not None:

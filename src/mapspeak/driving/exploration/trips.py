@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import AsyncGenerator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
@@ -12,7 +12,7 @@ import anyio
 from mapspeak.driving.drive import DriveBook, OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, TripEnd
-from mapspeak.errors import GoalError, PolicyError
+from mapspeak.errors import GoalError, LinkError, PolicyError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Cause, CauseCode, GoalState, Robot
 from mapspeak.spatial import OccupancyGrid
@@ -126,6 +126,7 @@ class Trips:
         self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = self.n_ended = 0
         self.end: TripEnd | None = None
         self._ended_m = self._begun_at_m = 0.0
+        self._advancing = anyio.Lock()
 
     @property
     def driven_m(self) -> float:
@@ -183,19 +184,38 @@ class Trips:
         wait_s = min(RETHINK_S, until_s - self._site.robot.now_s)
         if wait_s <= SLACK_S:
             return TripState.UNDER_WAY
-        report = await self._site.drives.wait(trip.goal_id, wait_s=wait_s, on_progress=_tell_nobody)
+        drives, before_s = self._site.drives, self._site.robot.now_s
+        try:
+            report = await drives.wait(trip.goal_id, wait_s=wait_s, on_progress=_tell_nobody)
+        except GoalError:
+            # So many drives have begun since that this one is forgotten.
+            self._leave()
+            self.n_ended += 1
+            return TripState.INTERRUPTED
         await on_trip(report)
-        return self._take_in(trip, report, grid)
+        state = self._take_in(trip, report, grid)
+        if state is TripState.UNDER_WAY and self._site.robot.now_s == before_s:
+            raise LinkError(
+                "The robot's clock stands still.",
+                hint="Unpause the simulation, then call again to go on.",
+            )
+        return state
 
     @asynccontextmanager
-    async def given_up_with_call(self) -> AsyncGenerator[None]:
-        """Bring the robot to a stand where who waits gives up, or the policy forbids to drive."""
-        try:
-            yield
-        except (anyio.get_cancelled_exc_class(), PolicyError):
-            with anyio.CancelScope(shield=True):
-                await self.give_up()
-            raise
+    async def one_call(self) -> AsyncGenerator[None]:
+        """Let one call after the other advance.
+
+        Where the caller gives up, or the policy forbids to drive, the robot comes to a stand.
+        """
+        async with self._advancing:
+            try:
+                yield
+            except (anyio.get_cancelled_exc_class(), PolicyError):
+                with anyio.CancelScope(shield=True):
+                    if (trip := self._leave()) is not None:
+                        self.n_ended += 1
+                        await self._site.drives.abandon(trip.goal_id)
+                raise
 
     async def give_up(self, *, is_seen: bool = False) -> None:
         """Bring the robot to a stand, where it is on a trip."""
@@ -204,7 +224,7 @@ class Trips:
             self.n_seen += is_seen
             self.n_ended += not is_seen
             try:
-                with anyio.CancelScope(shield=True):
+                with anyio.CancelScope(shield=True), suppress(GoalError):
                     await self._site.drives.cancel(trip.goal_id)
             finally:
                 self._leave()

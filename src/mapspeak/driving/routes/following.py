@@ -5,6 +5,7 @@ again with the next call.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -151,7 +152,12 @@ class RouteBook:
     async def _forget_ended(self) -> None:
         """Forget a drive that was ended between two calls: this call begins it again."""
         if self._goal_id is not None:
-            report = await self._site.drives.report(self._goal_id)
+            try:
+                report = await self._site.drives.report(self._goal_id)
+            except GoalError:
+                # So many drives have begun since that this one is forgotten.
+                self._goal_id = None
+                return
             if report.status.state in ENDED_ELSEWHERE:
                 self._goal_id = None
 
@@ -227,7 +233,7 @@ class RouteBook:
     async def _give_up(self) -> None:
         """End the drive of an older route, so that it does not continue."""
         if self._goal_id is not None:
-            with anyio.CancelScope(shield=True):
+            with anyio.CancelScope(shield=True), suppress(GoalError):
                 await self._site.drives.cancel(self._goal_id)
             self._goal_id = None
 

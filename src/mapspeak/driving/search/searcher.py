@@ -141,12 +141,12 @@ class Searcher:
             PolicyError: The robot must not drive now, to any goal; it is stopped.
         """
         key = name_key(thing)
-        if self._state.is_end or key != name_key(self._thing):
-            await self._trips.give_up()
-            seen_before = self._judged.get(key, ())
-            self._begin(thing, read_earlier(earlier, thing, judged=seen_before))
-        self._take_in(judgement)
-        async with self._trips.given_up_with_call():
+        async with self._trips.one_call():
+            if self._state.is_end or key != name_key(self._thing):
+                await self._trips.give_up()
+                seen_before = self._judged.get(key, ())
+                self._begin(thing, read_earlier(earlier, thing, judged=seen_before))
+            self._take_in(judgement)
             return await self._advance(judgement, budget, wait_s, on_trip, client)
 
     def _take_in(self, judgement: Judgement) -> None:
@@ -171,7 +171,8 @@ class Searcher:
         ended = None
         while ended is None:
             ended = await self._step(deadline_s, on_trip, client)
-            if ended is None and self._site.robot.now_s >= deadline_s - SLACK_S:
+            # A simulation that is begun anew sets its clock back.
+            if ended is None and not -wait_s <= self._site.robot.now_s - deadline_s < -SLACK_S:
                 ended = SearchState.DRIVING
         return await self._end(ended)
 
