@@ -199,7 +199,7 @@ class HeavyWorld(WorldModel):
     asked_in: set[int]
 
     @property
-    def frontiers(self) -> FrontierReport:  # type: ignore[override]
+    def frontiers(self) -> FrontierReport:
         self.asked_in.add(threading.get_ident())
         return super().frontiers
 
@@ -247,7 +247,7 @@ async def test_what_drives_on_an_older_map_have_shown_counts_no_more_on_a_new_on
     with session.drives.preparing() as ticket:
         await session.drives.start(NEAR, place="F2", ticket=ticket)
     robot.end_goal(GoalState.BLOCKED)
-    robot.grid = FailingRobot().grid.crop(slice(0, 6), slice(0, 12)) if robot.grid else None
+    robot.grid = two_rooms().crop(slice(0, 6), slice(0, 12))
     world = await session.fetch_world_model()
     tried = tries.find_tried(world.map)
     assert tried == NOTHING_TRIED
