@@ -7,7 +7,7 @@ import pytest
 
 from mapspeak.ros.messages.fields import Dialect
 from rosbridge_robot import ScriptedRobot
-from rosserved import Caller, on_our_server, on_script
+from rosserved import Caller, at_time, on_our_server, on_script
 
 pytestmark = pytest.mark.anyio
 FORWARD = {"linear": {"x": 0.2}}
@@ -86,3 +86,18 @@ async def test_a_connection_that_comes_back_at_once_brings_the_stand(tmp_path: P
         scripted.server.hangs_up = False
     assert "then the connection was lost; it is back, and a stand was sent" in said[0]
     assert scripted.server.asked("publish")[-1]["msg"] == STAND
+
+
+async def test_a_publication_that_is_refused_changes_nothing_of_what_a_stop_sends(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    odd = {"topic": "/odd/cmd_vel", "duration_s": 0.1}
+    async with at_time(scripted, tmp_path, 1.0) as (client, caller):
+        await caller.ask("ros_publish", **odd, fields=FORWARD, type="geometry_msgs/msg/Twist")
+        stamped = {"twist": FORWARD}
+        refused = await caller.refuse(
+            "ros_publish", **odd, fields=stamped, type="geometry_msgs/msg/TwistStamped"
+        )
+        assert "twist" not in client.started.velocities["/odd/cmd_vel"]
+    assert "was advertised as geometry_msgs/msg/Twist" in refused

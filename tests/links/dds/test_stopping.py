@@ -30,3 +30,30 @@ async def test_a_stop_of_a_robot_that_hears_velocities_is_enough() -> None:
         await robot.stop()
         await until(lambda: node.heard["/cmd_vel"])
     assert node.heard["/cmd_vel"][0]["linear"] == {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
+async def test_a_topic_on_which_nothing_can_be_sent_keeps_a_stop_from_no_other() -> None:
+    listening = partial(DdsNode.listen, topic="/cmd_vel", type_name="geometry_msgs/msg/Twist")
+    async with open_both(listening, patience=AT_ONCE) as (node, connection):
+        robot = await build_ros_robot(connection)
+        connection.started.note_velocity("/never_advertised", zero={})
+        ended: list[str] = []
+        connection.started.actions["/dance"] = Dance(ended)
+        with pytest.raises(LinkError, match="/never_advertised was not advertised"):
+            await robot.stop()
+        await until(lambda: node.heard["/cmd_vel"])
+    assert ended == ["dance"]
+
+
+class Dance:
+    """An action with a goal under way."""
+
+    is_busy = True
+    owners: frozenset[str] = frozenset()
+
+    def __init__(self, ended: list[str]) -> None:
+        self._ended = ended
+
+    async def end(self) -> bool:
+        self._ended.append("dance")
+        return True

@@ -203,15 +203,17 @@ class RosRobot:
         """
         if not self.connection.is_open:
             await self.connection.wait_until_connected()
-        self._brake.pull()
-        if self._driver is None:
-            # Others may have sent goals to a navigation that we have not found yet.
-            brake = self._brake
-            with suppress(LinkError):
-                await self._watch.look()
-            if self._brake is not brake:
-                self._brake.pull()
-        await stop_everything(self.connection, brake=self._brake)
+        try:
+            self._brake.pull()
+            if self._driver is None:
+                # Others may have sent goals to a navigation that we have not found yet.
+                brake = self._brake
+                with suppress(LinkError):
+                    await self._watch.look()
+                if self._brake is not brake:
+                    self._brake.pull()
+        finally:
+            await stop_everything(self.connection, brake=self._brake)
 
     async def settle(self) -> None:
         """Return when all that the robot offers counts as found."""

@@ -55,13 +55,23 @@ class Brake:
         return tuple(self._zeros())
 
     def pull(self) -> None:
-        """Publish zero velocity at once, then until the robot stands or a new motion begins."""
-        self._publish()
+        """Publish zero velocity at once, then until the robot stands or a new motion begins.
+
+        Raises:
+            LinkError: Nothing can be sent on one of the topics.
+        """
         self._connection.start_soon(partial(self._repeat, self._connection.started.n_begun))
+        self._publish()
 
     def _publish(self) -> None:
+        faults: list[LinkError] = []
         for topic, zero in self._zeros().items():
-            self._connection.publish_everywhere(topic, zero)
+            try:
+                self._connection.publish_everywhere(topic, zero)
+            except LinkError as error:
+                faults.append(error)
+        if faults:
+            raise faults[0]
 
     async def _repeat(self, n_begun: int) -> None:
         """Publish again, since a message may be overtaken and a base may keep to the last."""

@@ -119,9 +119,6 @@ class Publisher:
                 said = await self._send(wanted)
                 return f"{said}. {say_going_on(self._left_s(wanted.topic))}".rstrip()
             await self._check_that_nothing_moves(wanted.topic)
-            zero = zero_velocity_of(wanted.message)
-            # Every stop from now on publishes zero velocity there too.
-            self._inquiry.connection.started.note_velocity(wanted.topic, zero=zero)
             with self._keeping_others_off(wanted):
                 said = f"{await self._send(wanted)}."
             guard = self._session.guard
@@ -131,6 +128,10 @@ class Publisher:
         await self.prepare(wanted.topic, wanted.type)
         if self._was_stopped(wanted):
             raise STOPPED_BEFORE.error()
+        if wanted.is_moving:
+            zero = zero_velocity_of(wanted.message)
+            # Every stop from now on publishes zero velocity there too.
+            self._inquiry.connection.started.note_velocity(wanted.topic, zero=zero)
         if wanted.duration_s is None:
             await self._inquiry.connection.publish(wanted.topic, wanted.message)
             return f"Published once on {wanted.topic}"
