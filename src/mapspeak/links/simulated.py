@@ -207,6 +207,8 @@ class SimulatedRobot:
             self._after_step()
 
     def _take_picture(self, camera: str) -> CameraPicture:
+        # The world may go on while the picture is drawn.
+        pose, stamp_s = self._simulation.pose_in_map, self._simulation.time_s
         rgb = self._simulation.take_picture(camera)
         encoded = io.BytesIO()
         Image.fromarray(rgb).save(encoded, format="JPEG", quality=JPEG_QUALITY)
@@ -217,8 +219,8 @@ class SimulatedRobot:
             width_px=width_px,
             height_px=height_px,
             horizontal_fov_rad=HORIZONTAL_FOV_RAD,
-            pose=self._simulation.pose_in_map @ CAMERAS[camera],
-            stamp_s=self._simulation.time_s,
+            pose=pose @ CAMERAS[camera],
+            stamp_s=stamp_s,
         )
 
 

@@ -11,6 +11,9 @@ from pathlib import Path
 import anyio
 import orjson
 import pytest
+from anyio.abc import ByteStream, SocketAttribute
+from websockets.http11 import Request
+from websockets.server import ServerProtocol
 
 from benchmarks.mutations import mutate, seed_frames
 from mapspeak.errors import ConfigError, LinkError
@@ -489,6 +492,48 @@ async def test_a_message_in_countless_empty_frames_costs_the_connection() -> Non
         await next(iter(server.present)).send_raw(begun + more * (MAX_PARTS + 10))
         await server.until(lambda: len(server.visitors) == 3)
         assert await client.call_service("/echo", {"a": 1}) == {"a": 1}
+
+
+async def test_countless_empty_frames_behind_the_greeting_are_no_rosbridge() -> None:
+    async def greet(stream: ByteStream) -> None:
+        protocol = ServerProtocol()
+        async with stream:
+            protocol.receive_data(await stream.receive())
+            (request,) = protocol.events_received()
+            assert isinstance(request, Request)
+            protocol.send_response(protocol.accept(request))
+            frames = b"\x01\x00" + b"\x00\x00" * (MAX_PARTS + 10)
+            await stream.send(b"".join([*protocol.data_to_send(), frames]))
+
+    listener = await anyio.create_tcp_listener(local_host="127.0.0.1")
+    port = listener.extra(SocketAttribute.local_port)  # noqa: S610 - no SQL
+    async with listener, anyio.create_task_group() as tasks:
+        tasks.start_soon(listener.serve, greet)
+        told = await fails_with(RobotAddress(url=f"ws://127.0.0.1:{port}"))
+        tasks.cancel_scope.cancel()
+    assert "is not a rosbridge server" in told.message
+
+
+async def test_a_goal_whose_sender_gave_up_in_an_outage_takes_no_socket() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        server.hangs_up = True
+        await server.drop_all()
+        while client.lost_for_s is None:
+            await anyio.lowlevel.checkpoint()
+        with anyio.move_on_after(0.05):
+            await client.send_goal("/dance", {}, type_name="dance_msgs/action/Dance")
+        server.hangs_up = False
+        await server.until(lambda: is_whole(server))
+        client.subscribe("/scan")
+        await client.call_service("/add", {"a": 1}, timeout_s=PATIENCE_S)
+        await server.until(
+            lambda: any(each["topic"] == "/scan" for each in server.asked("subscribe"))
+        )
+        (asked,) = [each for each in server.present if each.asked("call_service")]
+        assert not asked.asked("subscribe")
 
 
 async def test_a_message_in_many_frames_is_put_together() -> None:

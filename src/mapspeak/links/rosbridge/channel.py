@@ -8,7 +8,7 @@ import anyio
 import anyio.lowlevel
 from anyio.abc import TaskGroup
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.endpoints import no_answer
 from mapspeak.links.rosbridge.address import RobotAddress
 from mapspeak.links.rosbridge.connection import SocketConnection
@@ -42,7 +42,7 @@ class Channel:
         self._standing: dict[str, bytes] = {}
         self._connection: SocketConnection | None = None
         self._is_up = anyio.Event()
-        self._fault: LinkError | None = None
+        self._fault: MapspeakError | None = None
         self._is_closing = False
         self._wanted = anyio.Event()
         self._up_since_s = 0.0
@@ -173,7 +173,8 @@ class Channel:
             self._wanted = anyio.Event()
             try:
                 await self._connect(tasks)
-            except LinkError as error:
+            except MapspeakError as error:
+                # A CA file that cannot be read now may be written anew.
                 self._fault = error
                 pause_s = self._pause_after(pause_s)
             else:

@@ -201,12 +201,9 @@ class RosbridgeClient(Rosapi):
             feedback=True,
         )
         channel = self._free_for_topics()
+        connection = await channel.wait_until_up(self.patience.answer_s)
+        connection.send(text)
         self._goals[goal.id] = (goal, channel)
-        try:
-            await channel.send(text, timeout_s=self.patience.answer_s)
-        except LinkError:
-            del self._goals[goal.id]
-            raise
         return goal
 
     def cancel_goal(self, goal: ActionGoal) -> None:

@@ -272,14 +272,14 @@ async def _shake_hands(address: RobotAddress, stream: ByteStream) -> WebSocket:
         while protocol.state is State.CONNECTING and protocol.handshake_exc is None:
             data = await stream.receive(READ_BYTES)
             protocol.receive_data(data)
+        # Bytes that came in the same packet as the answer are not lost.
+        for event in protocol.events_received():
+            if isinstance(event, Frame):
+                web_socket._take(event)  # noqa: SLF001 - likewise
     except (SocketClosed, anyio.EndOfStream, anyio.BrokenResourceError, OSError) as error:
         raise _no_rosbridge(address, "hung up without a word") from error
     if protocol.handshake_exc is not None:
         raise _refusal(address, protocol.handshake_exc) from protocol.handshake_exc
-    # Bytes that came in the same packet as the answer are not lost.
-    for event in protocol.events_received():
-        if isinstance(event, Frame):
-            web_socket._take(event)  # noqa: SLF001 - likewise
     return web_socket
 
 
