@@ -101,20 +101,21 @@ async def test_a_ca_file_that_is_none_is_said(tmp_path: Path) -> None:
 async def test_a_ca_file_that_is_away_for_a_while_only_delays_the_connection(
     certificate: Path, tmp_path: Path
 ) -> None:
-    ca_file = tmp_path / "ca.pem"
-    ca_file.write_bytes(certificate.read_bytes())
+    ca_file = anyio.Path(tmp_path / "ca.pem")
+    authority = await anyio.Path(certificate).read_text()
+    await ca_file.write_text(authority)
     server = ScriptedServer({"call_service": echo})
     with anyio.fail_after(PATIENCE_S):
         async with running(server, ssl_context=server_context(certificate)):
-            address = RobotAddress(url=f"wss://127.0.0.1:{server.port}", ca_file=ca_file)
+            address = RobotAddress(url=f"wss://127.0.0.1:{server.port}", ca_file=Path(ca_file))
             async with open_client(address, patience=QUICK) as client:
-                ca_file.unlink()
+                await ca_file.unlink()
                 await server.drop_all()
                 while (client.lost_for_s or 0.0) < 0.05:
                     await anyio.lowlevel.checkpoint()
                 with pytest.raises(LinkError, match="has been lost"):
                     await client.call_service("/add", {"a": 1}, timeout_s=0.05)
-                ca_file.write_bytes(certificate.read_bytes())
+                await ca_file.write_text(authority)
                 assert await client.call_service("/add", {"a": 2}, timeout_s=30.0) == {"a": 2}
 
 
