@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from mapspeak.skill import (
     SkillParameter,
     SkillState,
 )
+from mapspeak.skills.conditions import CONDITIONS
+from mapspeak.skills.treereading import CONTROL
 from missioning import missions
 from served import text_of
 from skillmaking import FakeSkill, never, spec
@@ -483,6 +486,19 @@ async def test_a_server_that_was_killed_mid_mission_is_told_of_after_a_restart(
     assert "2 drive: succeeded" in told
     async with missions(tmp_path) as later:
         assert "INTERRUPTED" not in await later.ask("show_missions")
+
+
+async def test_a_model_reads_the_whole_language_of_missions_in_the_tool_that_runs_them(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        tools = {each.name: each for each in (await caller.client.list_tools()).tools}
+    said = tools["run_mission"].description or ""
+    leaves = {"drive", "look", "note", "ask", "wait", "check", "wait_for"}
+    asked = {"answers", "otherwise", "within_s", "as", "do", "times", "needs"}
+    words = set(re.findall(r"[a-z_]+", said))
+    assert {*CONTROL, *leaves, *asked} <= words
+    assert {each.name for each in CONDITIONS} <= words
 
 
 async def test_the_schemas_of_the_tools_are_flat(tmp_path: Path) -> None:

@@ -90,12 +90,16 @@ class MissionTools:
     ) -> str:
         """Run a tree of steps that may move the robot, by itself, until it ends.
 
-        tree is YAML: a list of steps, each `skill: argument`: drive: R3; look: D2; note: text;
-        wait: 5; ask: question (answers: [a, b], otherwise: b, within_s); check or wait_for:
-        {battery_above: 0.3, in_room, near, event, sees, time_from, value: "{x}", is, above, not}.
-        `as: x` keeps a result for "{x.field}". Around steps: sequence, fallback, parallel: [...];
-        retry: 3, repeat: 3, timeout_s: 60, every_min: 60 (times), until: {...} (times), each
-        with do: [...].
+        tree is YAML: a list of steps, done one after the other, each `skill: argument` with its
+        options. drive: R3; look: D2 (camera); note: text; wait: seconds; ask: a question, with
+        answers: [open, shut], otherwise: shut, within_s: 60; check: or wait_for: (within_s) what
+        must hold: {{battery_above: 0.3}}, battery_below, standing: true, in_room: R3, near: W1,
+        within_m, event: words, sees: label, time_from: "22:00", time_until, value: "{{door}}"
+        with is, above or below; not: true. Other skills are steps, too. `as: door` beside a step
+        keeps its result for "{{door.answer}}" later. Steps hold steps: sequence, fallback (until
+        one succeeds) and parallel (needs: one) have lists; retry: 3, repeat: 3, timeout_s: 60,
+        every_min: 60 (times: 24) and until: {{a condition}} (times) stand beside do: [steps].
+        [{{every_min: 60, do: [{{drive: R3}}, {{ask: Is it tidy?, otherwise: no, as: tidy}}]}}]
         """
         if (tree is None) == (name is None):
             raise SkillError("A mission is either a tree or a name.", hint="Give one of them.")
