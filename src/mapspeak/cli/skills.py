@@ -1,7 +1,7 @@
 """`mapspeak skills`: check, list and try the skills in the owner's skills.yaml."""
 
 import math
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -48,7 +48,7 @@ def check(file: Path, robot: str | None) -> None:
     if robot is None:
         click.echo(f"{file}: {len(entries)} skills, no mistake.")
         return
-    anyio.run(_check, entries, robot)
+    _run(_check, entries, robot)
 
 
 @skills.command("list")
@@ -76,7 +76,15 @@ def try_skill(
     file: Path, name: str, arguments: tuple[str, ...], robot: str, **limits: Path | None
 ) -> None:
     """Run the skill NAME of FILE once, as a model would, and say how it ended."""
-    anyio.run(_try, _load(file), name, arguments, robot, GuardChoice(**limits))
+    _run(_try, _load(file), name, arguments, robot, GuardChoice(**limits))
+
+
+def _run(work: Callable[..., Awaitable[None]], *arguments: object) -> None:
+    """Do work whose words lead to no tools of a model."""
+    from mapspeak.server.text.offered import offering  # noqa: PLC0415 - heavy; help must be quick
+
+    with offering(()):
+        anyio.run(work, *arguments)
 
 
 def _load(file: Path) -> "tuple[OwnersEntry, ...]":

@@ -3,11 +3,13 @@
 import difflib
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 from mapspeak.errors import SkillError
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillParameter
 
 MOST_SHOWN = 60
+FLAGS = {"true": True, "false": False}
 NUMBERS = (ParameterKind.NUMBER, ParameterKind.WHOLE)
 WANTED = {
     ParameterKind.NUMBER: "a number",
@@ -51,7 +53,7 @@ def check_arguments(
 
 
 def check_value(parameter: SkillParameter, value: JsonValue, *, where: str, what: str) -> JsonValue:
-    """Return one argument as its parameter holds it.
+    """Return one argument as its parameter holds it; a number may be written as a text.
 
     Args:
         where: The name of the argument, or the path to a part of it.
@@ -64,10 +66,11 @@ def check_value(parameter: SkillParameter, value: JsonValue, *, where: str, what
     match parameter.kind:
         case ParameterKind.NUMBER | ParameterKind.WHOLE:
             fitting = _number(parameter, value)
-        case ParameterKind.TEXT | ParameterKind.BYTES if isinstance(value, str):
-            fitting = value if _is_within(parameter, len(value)) else None
-        case ParameterKind.FLAG if isinstance(value, bool):
-            fitting = value
+        case ParameterKind.TEXT | ParameterKind.BYTES if isinstance(value, str | int | float):
+            text = plain(value)
+            fitting = text if _is_within(parameter, len(text)) else None
+        case ParameterKind.FLAG:
+            fitting = FLAGS.get(plain(value))
         case ParameterKind.LIST if isinstance(value, list | tuple):
             if _is_within(parameter, len(value)):
                 fitting = [
@@ -110,7 +113,18 @@ def _is_within(parameter: SkillParameter, size: float) -> bool:
     return not (is_small or is_large)
 
 
+def plain(value: JsonValue) -> str:
+    """Return a value as people write it: 3 for 3.0, true for True."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
+
+
 def _number(parameter: SkillParameter, value: JsonValue) -> JsonValue | None:
+    if isinstance(said := value, str):
+        for read in (float, int):
+            with suppress(ValueError):
+                value = read(said)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value):
         return None

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from mapspeak.errors import SkillError
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillParameter
+from mapspeak.skills.arguments import plain
 
 TEXT, NUMBER, FLAG = ParameterKind.TEXT, ParameterKind.NUMBER, ParameterKind.FLAG
 OF_FACTS = (
@@ -127,13 +128,6 @@ def is_as_wanted(value: JsonValue, wanted: Mapping[str, JsonValue]) -> bool:
     except (TypeError, ValueError):
         return False
     return (above is None or number > above) and (below is None or number < below)
-
-
-def plain(value: JsonValue) -> str:
-    """Return a value as people write it: 3 for 3.0, true for True."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def _is_time(wanted: Arguments, now: datetime | None) -> bool:

@@ -11,8 +11,7 @@ from pathlib import Path
 from mapspeak.errors import SkillError
 from mapspeak.safety import ApprovalScope, CommandKind, RunSkill, within_scope
 from mapspeak.skill import Arguments, JsonValue, OnProgress, Skill, SkillOutcome, SkillSpec
-from mapspeak.skills.arguments import check_arguments
-from mapspeak.skills.conditions import plain
+from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
 from mapspeak.skills.missiontree import (

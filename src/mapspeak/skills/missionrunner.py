@@ -30,7 +30,6 @@ from mapspeak.skills.missiontree import (
     Step,
     StepKind,
     fill_in,
-    fit_kinds,
 )
 
 MOST_TOLD = 40
@@ -141,7 +140,6 @@ class MissionRunner:
         try:
             skill = self._find_skill(step.skill)
             given = fill_in(step.name_arguments(skill.spec), self._values)
-            given = fit_kinds(skill.spec.parameters, given)
             self._tell(now=f"{step.number} {step.skill}")
             outcome = await skill.run(given, partial(self._take_progress, step))
         except anyio.get_cancelled_exc_class():
@@ -224,9 +222,8 @@ def _say_end(step: Step, outcome: SkillOutcome) -> str:
     said = f"{step.number} {step.skill}: {outcome.state}"
     if outcome.code is not SkillCode.DONE:
         said += f" ({outcome.code})"
-    if outcome.outputs:
-        told = (f"{name}={str(each)[:60]}" for name, each in outcome.outputs.items())
-        said += f" {', '.join(told)}"
+    told = (f"{name}={str(each)[:60]}" for name, each in outcome.outputs.items() if each != "")
+    said = f"{said} {', '.join(told)}".rstrip()
     if outcome.quote:
         said += f' "{outcome.quote[:120]}"'
     return said[:MOST_LINE]

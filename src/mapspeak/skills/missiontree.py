@@ -11,15 +11,12 @@ from mapspeak.errors import SkillError
 from mapspeak.skill import (
     Arguments,
     JsonValue,
-    ParameterKind,
     Skill,
     SkillEffect,
-    SkillParameter,
     SkillSpec,
     SkillState,
 )
-from mapspeak.skills.arguments import check_arguments
-from mapspeak.skills.conditions import plain
+from mapspeak.skills.arguments import check_arguments, plain
 
 MOST_DRIVES = 1000
 MOST_NESTED = 5
@@ -229,18 +226,9 @@ def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
     later = {name for name, value in given.items() if find_names(value)}
     now = {name: value for name, value in given.items() if name not in later}
     known_now = tuple(each for each in spec.parameters if each.name not in later)
-    check_arguments(known_now, fit_kinds(known_now, now), skill=what)
+    check_arguments(known_now, now, skill=what)
     if strangers := later - {each.name for each in spec.parameters}:
         check_arguments(spec.parameters, dict.fromkeys(strangers), skill=what)
-
-
-def fit_kinds(parameters: Iterable[SkillParameter], given: Arguments) -> dict[str, JsonValue]:
-    """Return arguments with numbers written as text where their parameters are texts."""
-    texts = {each.name for each in parameters if each.kind is ParameterKind.TEXT}
-    return {
-        name: plain(value) if name in texts and isinstance(value, int | float) else value
-        for name, value in given.items()
-    }
 
 
 def find_names(value: JsonValue) -> set[str]:

@@ -452,6 +452,34 @@ async def test_a_saved_mission_is_a_skill_with_parameters_and_keeps_corrections(
     assert "'drive' is taken" in taken
 
 
+async def test_a_parameter_of_a_saved_mission_is_a_number_where_a_step_wants_one(
+    tmp_path: Path,
+) -> None:
+    tree = "- wait: '{seconds}'\n- check: {value: '{seconds}', above: 1, standing: '{rests}'}\n"
+    async with missions(tmp_path) as caller:
+        await caller.ask(
+            "save_mission", name="rest", tree=tree, parameters=["seconds=3", "rests=true"]
+        )
+        assert "succeeded after" in await caller.ask("run_mission", name="rest")
+        assert "succeeded after" in await caller.ask("rest", seconds=2)
+        told = await caller.ask("run_mission", name="rest", values=["seconds=a while"])
+    assert "duration_s cannot be 'a while'" in told
+
+
+async def test_a_correction_is_told_whenever_its_mission_is_used(tmp_path: Path) -> None:
+    async with missions(tmp_path) as caller:
+        await caller.ask("save_mission", name="visit", tree="- ask: Well?\n")
+        await caller.ask("save_mission", name="visit", correction="knock first")
+        listed = {each.name: each for each in (await caller.client.list_tools()).tools}
+        called = await caller.ask("visit")
+        stands = await caller.ask("skill_status")
+        await caller.ask("cancel_skill", run="S1")
+        within = await caller.ask("run_mission", tree="- visit\n")
+    for said in (listed["visit"].description or "", called, stands, within):
+        assert '"knock first"' in said
+    assert 'Q1: "Well?"' in called
+
+
 async def test_people_may_edit_the_file_of_a_mission(tmp_path: Path) -> None:
     async with missions(tmp_path) as caller:
         await caller.ask("save_mission", name="visit", tree="# where the lamps are\n- drive: R2\n")

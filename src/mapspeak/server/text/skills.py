@@ -44,11 +44,24 @@ HEADS = {
 }
 
 
-def describe_skill(spec: SkillSpec) -> str:
+def describe_skill(skill: Skill) -> str:
     """Return the description of a skill for a model; its owner's words are quoted."""
-    said = f": {quote(spec.description, most=MOST_SENTENCE)}." if spec.description else "."
-    needs = f" It needs: {say_conditions(spec.needs)}." if spec.needs else ""
-    return f"Run the robot's skill {spec.name}{said} {EFFECTS[spec.effect]}{needs}"
+    spec = skill.spec
+    needs = f"It needs: {say_conditions(spec.needs)}." if spec.needs else ""
+    told = (_title("Run the robot's skill", spec), EFFECTS[spec.effect], needs, say_remark(skill))
+    return " ".join(filter(None, told))
+
+
+def _title(what: str, spec: SkillSpec) -> str:
+    said = quote(spec.description.removesuffix("."), most=MOST_SENTENCE)
+    return f"{what} {spec.name}: {said}." if spec.description else f"{what} {spec.name}."
+
+
+def say_remark(*skills: Skill) -> str:
+    """Return what people have said about missions since they were saved."""
+    remarks = [said for each in skills if isinstance(each, Mission) for said in each.remember]
+    told = (f"Remember, as a person said: {quote(said, most=MOST_SENTENCE)}." for said in remarks)
+    return "\n".join(told)
 
 
 def say_conditions(conditions: Arguments) -> str:
@@ -72,27 +85,23 @@ def _say_condition(name: str, value: JsonValue) -> str:
 def say_mission(mission: Mission, bounds: MissionBounds) -> str:
     """Return a mission as a tree, with its parameters and what it may do at most."""
     spec = mission.spec
-    said = f": {quote(spec.description, most=MOST_SENTENCE)}" if spec.description else ""
-    lines = [f"Mission {spec.name}{said}."]
+    lines = [_title("Mission", spec)]
     for each in spec.parameters:
         default = "" if each.default is None else f", {each.default!r} when left out"
         lines.append(f"It takes {each.name}, {say_wanted(each)}{default}.")
-    return "\n".join([*lines, say_bounds(mission, bounds), *_draw(mission.tree, "", "")])
+    lines += filter(None, [say_remark(mission), say_bounds(mission, bounds)])
+    return "\n".join([*lines, *_draw(mission.tree, "", "")])
 
 
 def say_bounds(mission: Mission, bounds: MissionBounds) -> str:
-    """Return what people said about a mission, and what it may do at most."""
-    told = [
-        f"Remember, as a person said: {quote(each, most=MOST_SENTENCE)}."
-        for each in mission.remember
-    ]
+    """Return what a mission may do at most, and what people said about those within it."""
     asked = f" A person is asked for {', '.join(sorted(bounds.asked))}." if bounds.asked else ""
-    told.append(
+    told = (
         f"At most {say_count(bounds.n_drives, 'drive')} and "
         f"{say_count(bounds.n_commands, 'other command')} "
         f"within {mission.spec.timeout_s / 60:g} min.{asked}"
     )
-    return "\n".join(told)
+    return "\n".join(filter(None, [told, say_remark(*bounds.parts.values())]))
 
 
 def _draw(step: Step, indent: str, tail: str) -> Iterator[str]:

@@ -48,7 +48,6 @@ NO_ROS_TOOLS = Refusal(
 
 NO_NAME = Refusal("{name!r} is no name in ROS.", "It looks like /map or /robot1/cmd_vel.")
 NONE_AT_ALL = Refusal("The robot has no {what}s at all.", "Start its ROS nodes.")
-NONE_SUCH = Refusal("The robot has no {what} {name!r}.", "{such} {names}. ros_{what}s lists all.")
 
 NO_TYPE = Refusal(
     "{type!r} is no full name of a type.",
@@ -65,8 +64,9 @@ NOT_INSTALLED = Refusal(
 )
 UNKNOWN_TYPE = Refusal(
     "Unknown type {type}: neither the robot nor mapspeak describes it.{meant}",
-    "Give its definition to {ros_type}, as `ros2 interface show` (ROS 1: `rosmsg show -r`, "
-    "`rossrv show -r`) prints it on the robot, with --- between the parts.",
+    "Give its definition, as `ros2 interface show` (ROS 1: `rosmsg show -r`, `rossrv show -r`) "
+    "prints it on the robot, with --- between the parts. {ros_type} takes it. In skills.yaml it is "
+    "the key `definition`.",
 )
 KNOWN_TYPE = Refusal(
     "What a {type} looks like is known already.",
@@ -162,7 +162,8 @@ def refuse_name(what: str, name: str, known: Iterable[str]) -> MapspeakError:
         return NONE_AT_ALL.error(what=what)
     near = find_nearest(name, names)
     such = f"The nearest of {len(names)}:" if near else f"There are {len(names)}, such as"
-    return NONE_SUCH.error(what=what, name=name[:80], such=such, names=", ".join(near or names[:5]))
+    hint = f"{such} {', '.join(near or names[:5])}. {lead(f'{{ros_{what}s}} lists all.')}"
+    return LinkError(f"The robot has no {what} {name[:80]!r}.", hint=hint.rstrip())
 
 
 def refuse_goal(handle: str | None, known: Sequence[str]) -> GoalError:

@@ -89,7 +89,7 @@ class SkillBoard:
         tool = ListedTool(
             name=spec.name,
             title=quote(spec.description or spec.name, most=MOST_TITLE).strip('"'),
-            description=describe_skill(spec),
+            description=describe_skill(skill),
             input_schema=schema_of((*spec.parameters, *((WAIT,) if _is_long(skill) else ()))),
             annotations=ToolAnnotations(read_only_hint=True) if reads else acts,
         )
@@ -124,7 +124,9 @@ class SkillBoard:
             )
         except MapspeakError as error:
             raise ToolError(say_error(error)) from error
-        return CallToolResult(content=[TextContent(type="text", text=say_run(run))])
+        return CallToolResult(
+            content=[TextContent(type="text", text=say_run(run, self.runs.questions))]
+        )
 
 
 def _is_long(skill: Skill) -> bool:

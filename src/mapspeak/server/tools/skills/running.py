@@ -9,7 +9,7 @@ from pydantic import Field
 from mapspeak.memory.quoting import clean_line, quote
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.ros.values import cut, show_message
-from mapspeak.server.text.skills import CODES, GOES_ON, say_conditions, say_waiting
+from mapspeak.server.text.skills import CODES, GOES_ON, say_conditions, say_remark, say_waiting
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.toolset import ToolEffect, tool
@@ -78,6 +78,7 @@ def say_run(run: SkillRun, questions: QuestionBook | None = None) -> str:
     """
     progress = run.progress
     parts = [f"{run.handle} ({run.skill.spec.name}): {run.state} after {run.passed_s:.1f} s."]
+    parts.append(say_remark(run.skill))
     if progress is not None and run.error is None:
         parts.append(_say_account(progress.account))
     if run.outcome is not None:
