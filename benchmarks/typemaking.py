@@ -22,8 +22,12 @@ def make_types(
     """Return a book, and the names of so many types in it, standard ones and made up."""
     known = known_definitions(dialect)
     book = TypeBook(known)
+    # ROS 1 has times of its own: what looks like those of ROS 2 is served as one of these.
+    foreign = "builtin_interfaces/" if dialect is Dialect.ROS1 else "none/"
     fitting = [
-        name for name in sorted(known) if not book.missing(name) and "wstring" not in known[name]
+        name
+        for name, text in sorted(known.items())
+        if not book.missing(name) and "wstring" not in text and not name.startswith(foreign)
     ]
     dice = random.Random(seed)  # noqa: S311 - no secrets
     maker = _Maker(

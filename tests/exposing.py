@@ -69,6 +69,7 @@ async def watched(
     mode: str = "auto",
     on_message: MessageHandlerFnT | None = None,
     skills: Sequence[OwnersEntry] = (),
+    toolsets: tuple[str, ...] = ("drive", "missions"),
 ) -> AsyncGenerator[Watched]:
     """Gives a client of a server whose skills are kept."""
     memory = SemanticMapStore(folder / "semantic_map.yaml")
@@ -77,7 +78,7 @@ async def watched(
     )
     server = build_server(
         session,
-        toolsets=("drive", "missions"),
+        toolsets=toolsets,
         expose=expose,
         is_read_only=is_read_only,
         skills=skills,

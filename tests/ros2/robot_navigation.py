@@ -7,7 +7,7 @@ from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist
-from nav2_msgs.action import NavigateToPose, Spin
+from nav2_msgs.action import FollowWaypoints, NavigateToPose, Spin
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
@@ -60,6 +60,9 @@ class Navigation:
     def offer_actions(self) -> None:
         self._offer(NavigateToPose, "navigate_to_pose", self._drive_to)
         self._offer(Spin, "spin", self._spin)
+
+    def offer_waypoints(self) -> None:
+        self._offer(FollowWaypoints, "follow_waypoints", self._follow)
 
     def offer_goal_topic(self) -> None:
         """Take goals that no one can cancel, as every robot that RViz sends to does."""
@@ -167,6 +170,17 @@ class Navigation:
         drive = Drive(self.node, Spin.Result(), handle=handle)
         drive.left_rad = handle.request.target_yaw
         return self._begin(drive)
+
+    def _follow(self, handle: Message) -> Message:
+        """Drive to one pose after the other; each has to be reached."""
+        result, error = FollowWaypoints.Result(), 0
+        for index, pose in enumerate(handle.request.poses):
+            handle.publish_feedback(FollowWaypoints.Feedback(current_waypoint=index))
+            drive = Drive(self.node, NavigateToPose.Result(), goal=pose_from_message(pose.pose))
+            error = error or self._begin(drive).error_code
+        result.error_code = error
+        (handle.abort if error else handle.succeed)()
+        return result
 
     def _take_pose(self, message: Message) -> None:
         goal = pose_from_message(message.pose)

@@ -113,6 +113,8 @@ class RobotNode:
             self.navigation.offer_actions()
         elif part == "goal_topic":
             self.navigation.offer_goal_topic()
+        elif part == "waypoints":
+            self.navigation.offer_waypoints()
         elif part == "costmaps":
             self._start_costmaps()
         else:
@@ -229,7 +231,9 @@ def read_arguments() -> argparse.Namespace:
     parser.add_argument("--pose", type=float, nargs=3, required=True, metavar=("X", "Y", "YAW"))
     parser.add_argument("--speed-mps", type=float, default=1.0)
     parser.add_argument("--namespace", default="", help="of all names, TF's too")
-    parser.add_argument("--also", nargs="*", default=[], help="goal_topic, costmaps")
+    parser.add_argument(
+        "--also", nargs="*", default=[], help="goal_topic, costmaps, rear_camera, plans, waypoints"
+    )
     parser.add_argument("--later", nargs="*", default=[], help="parts that come when told to")
     parser.add_argument("--participants", type=int, default=0, help="that do nothing, beside it")
     parser.add_argument("--robot-radius", type=float, default=0.35, help="in the costmaps")

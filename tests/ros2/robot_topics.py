@@ -6,11 +6,18 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import (
+    Point32,
+    PolygonStamped,
+    PoseStamped,
+    Transform,
+    TransformStamped,
+    Twist,
+)
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import Transform, TransformStamped, Twist
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid as GridMessage
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
 from numpy.typing import NDArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CameraInfo, Image, LaserScan
@@ -35,6 +42,15 @@ PARTS: dict[str, tuple[tuple[str, type, QoSProfile | int], ...]] = {
     "odometry": (("odom", Odometry, 10),),
     "scan": (("scan", LaserScan, 10),),
     "camera": (("camera/image_raw", Image, 10), ("camera/camera_info", CameraInfo, 10)),
+    "rear_camera": (
+        ("rear_camera/image_raw", Image, 10),
+        ("rear_camera/camera_info", CameraInfo, 10),
+    ),
+    "plans": (
+        ("plan", Path, 10),
+        ("local_costmap/published_footprint", PolygonStamped, 10),
+        ("local_costmap/costmap", GridMessage, LATCHED),
+    ),
     "velocity": (),
 }
 """What belongs to each part of the robot: its topics, their types and how they are sent."""
@@ -70,7 +86,7 @@ class Topics:
 
     # --- the map
 
-    def publish_map(self, grid: OccupancyGrid) -> None:
+    def publish_map(self, grid: OccupancyGrid, *, topic: str = "map") -> None:
         message = GridMessage()
         message.header.frame_id = "map"
         message.header.stamp = self._now()
@@ -78,7 +94,7 @@ class Topics:
         message.info.width, message.info.height = grid.n_cols, grid.n_rows
         message.info.origin = message_from_pose(grid.origin)
         message.data = packed(grid.cells)
-        self._publish("map", message)
+        self._publish(topic, message)
 
     def publish_map_update(self, cells: NDArray[np.int8], *, row: int, col: int) -> None:
         message = OccupancyGridUpdate()
@@ -101,7 +117,9 @@ class Topics:
         self._publish_odometry(odom_from_base)
         if self._n_steps % CAMERA_EVERY == 0:
             self._publish_scan(motion)
-            self._publish_picture()
+            self._publish_picture("camera")
+            self._publish_picture("rear_camera")
+            self._publish_plans(motion)
         self._n_steps += 1
 
     def _publish_odometry(self, odom_from_base: Pose) -> None:
@@ -122,31 +140,49 @@ class Topics:
         message.ranges = motion.scan(n_beams=N_BEAMS, range_m=SCAN_RANGE_M)
         self._publish("scan", message)
 
-    def _publish_picture(self) -> None:
+    def _publish_picture(self, camera: str) -> None:
         """A picture with its left half red and its right half blue; its rows are padded."""
         row = b"\xff\x00\x00" * (WIDTH // 2) + b"\x00\x00\xff" * (WIDTH // 2) + bytes(PADDING_BYTES)
         image, info = Image(), CameraInfo()
         for message in (image, info):
             message.header.stamp = self._now()
-            message.header.frame_id = "camera_optical"
+            message.header.frame_id = f"{camera}_optical"
             message.width, message.height = WIDTH, HEIGHT
         image.encoding, image.step, image.data = "rgb8", len(row), array.array("B", row * HEIGHT)
         focal, cx, cy = FOCAL_LENGTH_PX, WIDTH / 2.0, HEIGHT / 2.0
         info.distortion_model = "plumb_bob"
         info.k = [focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0]
         info.p = [focal, 0.0, cx, 0.0, 0.0, focal, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
-        self._publish("camera/image_raw", image)
-        self._publish("camera/camera_info", info)
+        self._publish(f"{camera}/image_raw", image)
+        self._publish(f"{camera}/camera_info", info)
+
+    def _publish_plans(self, motion: Motion) -> None:
+        """A path of 2 m ahead, a square around the robot, and the map as a costmap."""
+        path, square = Path(), PolygonStamped()
+        for message in (path, square):
+            message.header.stamp, message.header.frame_id = self._now(), "map"
+        ways = (Pose(0.0, 0.0), Pose(2.0, 0.0))
+        path.poses = [PoseStamped(pose=message_from_pose(motion.pose @ each)) for each in ways]
+        at = motion.pose
+        square.polygon.points = [
+            Point32(x=at.x + x, y=at.y + y)
+            for x, y in ((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2))
+        ]
+        self._publish("plan", path)
+        self._publish("local_costmap/published_footprint", square)
+        self.publish_map(motion.grid, topic="local_costmap/costmap")
 
     # --- frames
 
     def _publish_static_frames(self) -> None:
-        camera = self._frame("base_link", "camera_optical", Pose(0.1, 0.0, 0.0))
-        camera.transform.translation.z = 0.3
-        rotation = camera.transform.rotation
-        rotation.x, rotation.y, rotation.z, rotation.w = -0.5, 0.5, -0.5, 0.5
-        base = self._frame("base_footprint", "base_link", Pose(0.0, 0.0, 0.0))
-        self._publish("tf_static", TFMessage(transforms=[base, camera]))
+        frames = [self._frame("base_footprint", "base_link", Pose(0.0, 0.0, 0.0))]
+        for camera, turned in (("camera", 1.0), ("rear_camera", -1.0)):
+            optical = self._frame("base_link", f"{camera}_optical", Pose(0.1, 0.0, 0.0))
+            optical.transform.translation.z = 0.3
+            rotation = optical.transform.rotation
+            rotation.x, rotation.y, rotation.z, rotation.w = -0.5, 0.5 * turned, -0.5 * turned, 0.5
+            frames.append(optical)
+        self._publish("tf_static", TFMessage(transforms=frames))
 
     def _frame(self, parent: str, child: str, pose: Pose) -> Message:
         frame = TransformStamped()

@@ -32,7 +32,7 @@ from mapspeak.spatial.mapfiles import MapMode, load_map
 from mapspeak.spatial.mapwriting import write_map
 
 ANSWER_WITHIN_S = 1200.0
-"""Wall time. A trial that hangs is killed sooner; on a loaded machine one answer may take minutes."""
+"""Wall time. A trial that hangs is killed; on a loaded machine one answer may take minutes."""
 AUDIT, CONTROL = "audit.jsonl", "control"
 SERVE = (sys.executable, "-m", "mapspeak", "serve")
 CLOCK_ZERO = datetime(2000, 1, 1, tzinfo=UTC)

@@ -57,23 +57,23 @@ OVERLAP_RATIO = 1.1
 """A thing at the edge of one picture is whole in the next."""
 TurnBy = Annotated[
     float | None,
-    Field(description="degrees, left positive", ge=-180, le=180, allow_inf_nan=False),
+    Field(description="left positive", ge=-180, le=180, allow_inf_nan=False),
 ]
 TurnTo = Annotated[
     float | None,
-    Field(description="heading to end with, counter-clockwise from +x", allow_inf_nan=False),
+    Field(description="heading, counter-clockwise from +x", allow_inf_nan=False),
 ]
 NPictures = Annotated[
     int | None,
     Field(
-        description="all around; else as many as leave no gap",
+        description="else as many as leave no gap",
         ge=2,
         le=MOST_PICTURES,
         strict=True,
     ),
 ]
 AsNear = Annotated[bool, Field(description="else drive to that")]
-GoalId = Annotated[str | None, Field(description="such as G1; else the latest")]
+GoalId = Annotated[str | None, Field(description="e.g. G1; else the latest")]
 
 
 class DriveTools:
@@ -220,7 +220,7 @@ class ViewTools:
     async def turn(
         self, context: Context, by_deg: TurnBy = None, to_yaw_deg: TurnTo = None
     ) -> DriveAnswer:
-        """Turn the robot where it stands, by an angle or to a heading, to look another way."""
+        """Turn the robot where it stands, by an angle or to a heading."""
         if (by_deg is None) == (to_yaw_deg is None):
             raise GoalError(
                 "A turn is either by an angle or to a heading.",
@@ -236,7 +236,7 @@ class ViewTools:
     async def look_around(
         self, context: Context, n_pictures: NPictures = None, camera: Camera = None
     ) -> list[str | Image]:
-        """Turn the robot where it stands and take a camera picture at each of several headings.
+        """Turn the robot where it stands and take pictures at several headings.
 
         Use it to see a whole room.
         """

@@ -24,11 +24,11 @@ from mapspeak.session import Session
 Layers = Annotated[list[Layer] | None, Field(description="what to draw; else all but the last two")]
 Around = Annotated[
     str | None,
-    Field(description='zoom in on an id, a name, "robot" or "x, y"', max_length=200),
+    Field(description='zoom in on a place, or "robot"', max_length=200),
 ]
 Radius = Annotated[
     float | None,
-    Field(description="metres to each side of it", ge=0.5, le=200, allow_inf_nan=False),
+    Field(description="metres to each side", ge=0.5, le=200, allow_inf_nan=False),
 ]
 Full = Annotated[bool, Field(description="also what is unchanged")]
 UpIs = Annotated[Up, Field(description="what points up")]
@@ -60,7 +60,7 @@ class LookTools:
         *,
         full: Full = False,
     ) -> list[str | Image]:
-        """Show the robot's map: an annotated picture and the same facts as text tables.
+        """Show the robot's map: an annotated picture and the same as text tables.
 
         Use it first, and again after every drive: rooms (R), corridors (C), doors (D), frontiers to
         the unknown (F) and remembered places (W) with areas, poses and path distances. Any id is a

@@ -68,21 +68,17 @@ class PaperTools:
     @tool(
         "Map as a grey picture (paper)",
         ToolEffect.READS,
-        leads="Use {look_at_map} instead for rooms, frontiers and numbers.",
+        leads="Use {look_at_map} for rooms, frontiers and numbers.",
     )
     async def subscribe_map_as_image(self) -> list[str | Image]:
-        """Return the robot's map as a grey picture: white free, grey unknown, dark occupied."""
+        """Return the map as a grey picture: white free, grey unknown, dark occupied."""
         grid = await self._session.robot.fetch_map()
         picture = await self._session.compute(lambda: draw_map_plain(grid))
         return [say_plain(grid, picture), Image(data=picture.png, format="png")]
 
-    @tool(
-        "Map with axes and grid (paper)",
-        ToolEffect.READS,
-        leads="Use it after {subscribe_map_as_image}, or alone.",
-    )
+    @tool("Map with axes and grid (paper)", ToolEffect.READS)
     async def draw_map_axis(self) -> list[str | Image]:
-        """Return the map with axes and a metric grid, numbered in metres."""
+        """Return the map with axes and a grid, numbered in metres."""
         grid = await self._session.robot.fetch_map()
         picture = await self._session.compute(lambda: draw_map_axis(grid))
         return [say_axes(grid, picture), Image(data=picture.png, format="png")]

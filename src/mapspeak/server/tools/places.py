@@ -28,16 +28,15 @@ MOST_PLACES = 30
 OnePlace = Annotated[
     str,
     Field(
-        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3", '
-        '"second-smallest room"',
+        description='an id, a name, "robot", "x, y, yaw_deg" or a phrase: "left of W3"',
         max_length=200,
     ),
 ]
 Places = Annotated[
     list[Annotated[str, Field(max_length=200)]] | None,
     Field(
-        description='ids, names, points or phrases: "the two nearest doors", "every remembered '
-        'extinguisher"; all rooms when left out',
+        description='ids, names, points or phrases: "every remembered extinguisher"; else all '
+        "rooms",
         max_length=MOST_PLACES,
     ),
 ]
@@ -52,7 +51,7 @@ class PlaceTools:
 
     @tool("One place in full", ToolEffect.READS)
     async def describe_place(self, place: OnePlace) -> str:
-        """Describe one room, corridor, door, frontier, remembered place or point of the map.
+        """Describe one room, corridor, door, frontier, remembered place or point.
 
         Use it for shape, doors along a corridor, what was seen there, how to get there.
         """
