@@ -109,13 +109,11 @@ class _Opened:
 
     async def call(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Call the service; an answer that reports its own failure is a failure."""
-        type_name = self.described.said
-        self.ros.inquiry.check_policy(
-            Call(service=self.interface.name, type=type_name, arguments={})
-        )
-        request = await self._check(arguments)
         answer = await self.ros.inquiry.connection.call_service(
-            self.interface.name, request, type_name=type_name, timeout_s=self.spec.timeout_s
+            self.interface.name,
+            await self._check(arguments),
+            type_name=self.described.said,
+            timeout_s=self.spec.timeout_s,
         )
         outputs = self._read(1, answer)
         if answer.get("success", True) is False:
@@ -126,9 +124,7 @@ class _Opened:
     async def act(self, arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Send a goal and follow it; one that is given up or late is cancelled at its server."""
         n_stops = self.ros.inquiry.connection.started.n_stops
-        name, type_name = self.interface.name, self.interface.type
-        self.ros.inquiry.check_policy(Act(action=name, type=type_name, goal={}))
-        goal = await self._check(arguments)
+        name, goal = self.interface.name, await self._check(arguments)
         tracked = await self.ros.goals.send(name, goal, described=self.described, n_stops=n_stops)
         try:
             with anyio.move_on_after(self.spec.timeout_s):
@@ -148,9 +144,7 @@ class _Opened:
 
     async def publish(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Publish once; a velocity for a time, then a stand, also where it is given up."""
-        name, kind = self.interface.name, self.interface.type
-        self.ros.inquiry.check_policy(Publish(topic=name, type=kind, message={}))
-        message = await self._check(arguments)
+        name, message = self.interface.name, await self._check(arguments)
         lasts_s = float(arguments[DURATION.name]) if self.interface.is_velocity else None
         await self.ros.publisher.publish(
             PublishRun(topic=name, type=self.described.said, message=message, duration_s=lasts_s)
@@ -173,8 +167,11 @@ class _Opened:
 
         Raises:
             LinkError: It does not fit, or names an unknown frame.
+            PolicyError: The interface is denied.
             SkillError: An argument is unknown, or has a wrong value.
         """
+        if (command := self.interface.command) is not None:
+            self.ros.inquiry.check_policy(command)
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
         given.pop(DURATION.name, None)
         message = self.described.check(self.sent.build(given))

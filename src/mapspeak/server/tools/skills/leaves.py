@@ -37,74 +37,67 @@ NUMBER, TEXT, LIST = ParameterKind.NUMBER, ParameterKind.TEXT, ParameterKind.LIS
 READS, MOVES = SkillEffect.READS, SkillEffect.MOVES
 WHERE = "an id, a remembered name, a phrase, or x, y"
 AHEAD = "ahead"
-DRIVE = SkillSpec(
+
+
+def _spec(
+    name: str, description: str, effect: SkillEffect, timeout_s: float, *parameters: SkillParameter
+) -> SkillSpec:
+    return SkillSpec(name, description, effect, timeout_s=timeout_s, parameters=parameters)
+
+
+def _within(default_s: float) -> SkillParameter:
+    return SkillParameter("within_s", NUMBER, unit="s", least=1, most=DAY_S, default=default_s)
+
+
+DRIVE = _spec(
     "drive",
     "Drives to a place",
     MOVES,
-    timeout_s=HOUR_S,
-    parameters=(
-        SkillParameter("place", TEXT, description=WHERE, most=200, is_required=True),
-        SkillParameter("yaw_deg", NUMBER, unit="deg on arrival"),
-    ),
+    HOUR_S,
+    SkillParameter("place", TEXT, description=WHERE, most=200, is_required=True),
+    SkillParameter("yaw_deg", NUMBER, unit="deg on arrival"),
 )
-LOOK = SkillSpec(
+LOOK = _spec(
     "look",
     "Takes a picture: of a place from a clear view of it, or of what is ahead",
     MOVES,
-    timeout_s=HOUR_S,
-    parameters=(
-        SkillParameter("place", TEXT, description="ahead where left out", most=200, default=AHEAD),
-        SkillParameter("camera", TEXT, description="another than the front one", most=60),
-    ),
+    HOUR_S,
+    SkillParameter("place", TEXT, description="ahead where left out", most=200, default=AHEAD),
+    SkillParameter("camera", TEXT, description="another than the front one", most=60),
 )
-NOTE = SkillSpec(
+NOTE = _spec(
     "note",
     "Notes an observation where the robot is",
     READS,
-    timeout_s=60.0,
-    parameters=(SkillParameter("text", TEXT, most=300, is_required=True),),
+    60.0,
+    SkillParameter("text", TEXT, most=300, is_required=True),
 )
-CHECK = SkillSpec(
-    "check",
-    "Succeeds where all that is given holds now",
-    READS,
-    timeout_s=60.0,
-    parameters=CONDITIONS,
+CHECK = _spec("check", "Succeeds where all that is given holds now", READS, 60.0, *CONDITIONS)
+WAIT_FOR = _spec(
+    "wait_for", "Waits until all that is given holds", READS, DAY_S, *CONDITIONS, _within(600.0)
 )
-WITHIN = SkillParameter("within_s", NUMBER, unit="s", least=1, most=DAY_S, default=600.0)
-WAIT_FOR = SkillSpec(
-    "wait_for",
-    "Waits until all that is given holds",
-    READS,
-    timeout_s=DAY_S,
-    parameters=(*CONDITIONS, WITHIN),
-)
-WAIT = SkillSpec(
+WAIT = _spec(
     "wait",
     "Waits",
     READS,
-    timeout_s=DAY_S + 60,
-    parameters=(
-        SkillParameter("duration_s", NUMBER, unit="s", least=0, most=DAY_S, is_required=True),
-    ),
+    DAY_S + 60,
+    SkillParameter("duration_s", NUMBER, unit="s", least=0, most=DAY_S, is_required=True),
 )
 ANSWER = SkillParameter("", TEXT, most=80)
-ASK = SkillSpec(
+ASK = _spec(
     "ask",
     "Asks the model or the person who runs the mission, and waits for the answer",
     READS,
-    timeout_s=DAY_S,
-    parameters=(
-        SkillParameter("question", TEXT, most=300, is_required=True),
-        SkillParameter(
-            "answers", LIST, description="any where left out", least=2, most=10, item=ANSWER
-        ),
-        SkillParameter(
-            "otherwise", TEXT, description="without an answer; else the step fails", most=300
-        ),
-        SkillParameter("within_s", NUMBER, unit="s", least=1, most=DAY_S, default=300.0),
-        SkillParameter("picture", TEXT, description="its id; the latest if left out", most=40),
+    DAY_S,
+    SkillParameter("question", TEXT, most=300, is_required=True),
+    SkillParameter(
+        "answers", LIST, description="any where left out", least=2, most=10, item=ANSWER
     ),
+    SkillParameter(
+        "otherwise", TEXT, description="without an answer; else the step fails", most=300
+    ),
+    _within(300.0),
+    SkillParameter("picture", TEXT, description="its id; the latest if left out", most=40),
 )
 ENDS = {
     GoalState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
