@@ -48,6 +48,7 @@ NO_ROS_TOOLS = Refusal(
 
 NO_NAME = Refusal("{name!r} is no name in ROS.", "It looks like /map or /robot1/cmd_vel.")
 NONE_AT_ALL = Refusal("The robot has no {what}s at all.", "Start its ROS nodes.")
+NONE_SUCH = Refusal("The robot has no {what} {name!r}.", "{such} {names}. {listing}")
 
 NO_TYPE = Refusal(
     "{type!r} is no full name of a type.",
@@ -162,8 +163,9 @@ def refuse_name(what: str, name: str, known: Iterable[str]) -> MapspeakError:
         return NONE_AT_ALL.error(what=what)
     near = find_nearest(name, names)
     such = f"The nearest of {len(names)}:" if near else f"There are {len(names)}, such as"
-    hint = f"{such} {', '.join(near or names[:5])}. {lead(f'{{ros_{what}s}} lists all.')}"
-    return LinkError(f"The robot has no {what} {name[:80]!r}.", hint=hint.rstrip())
+    listing = lead(f"{{ros_{what}s}} lists all.")
+    told = ", ".join(near or names[:5])
+    return NONE_SUCH.error(what=what, name=name[:80], such=such, names=told, listing=listing)
 
 
 def refuse_goal(handle: str | None, known: Sequence[str]) -> GoalError:
