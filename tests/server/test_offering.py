@@ -14,6 +14,7 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
 from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.server.text.offered import lead, offering
+from mapspeak.server.text.ros.refusals import refuse_name
 from served import connect, text_of
 
 pytestmark = pytest.mark.anyio
@@ -41,6 +42,15 @@ CALLS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("recall_episodes", {"picture_of": "nobody"}),
     ("write_semantic_data", {"name": "b", "description": "", "functional_landmarks": ["tap"]}),
 )
+
+
+def test_names_of_ros_that_are_not_there_lead_to_a_list_only_where_it_is_offered() -> None:
+    with offering(()):
+        assert str(refuse_name("service", "/lift", ["/lift_up"])).endswith("of 1: /lift_up.")
+    with offering({"ros_services"}):
+        assert str(refuse_name("service", "/lift", ["/lift_up"])).endswith(
+            "ros_services lists all."
+        )
 
 
 def tools_in(text: str) -> set[str]:
