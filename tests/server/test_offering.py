@@ -14,7 +14,7 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
 from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.server.text.offered import lead, offering
-from mapspeak.server.text.ros.refusals import refuse_name
+from mapspeak.server.text.ros.outcomes import refuse_name
 from served import connect, text_of
 
 pytestmark = pytest.mark.anyio

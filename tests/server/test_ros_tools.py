@@ -191,7 +191,7 @@ async def test_a_type_that_nobody_knows_can_be_described_by_the_model(tmp_path: 
     async with on_script(scripted, tmp_path) as caller:
         text = await caller.refuse("ros_call", service="/grasp", fields={"width_m": 0.1})
         assert "Unknown type arm_msgs/srv/Grasp: neither the robot nor mapspeak" in text
-        assert "Give its definition to ros_type" in text
+        assert "ros_type takes it." in text
         definition = "float64 width_m\n---\nbool held"
         await caller.ask("ros_type", type="arm_msgs/srv/Grasp", definition=definition)
         answer = await caller.ask("ros_call", service="/grasp", fields={"width_m": 0.1})
