@@ -15,7 +15,7 @@ from mapspeak.ros.discovery.profile import NavigationKind, PoseSource
 from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.robot import RosRobot
-from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted
+from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
@@ -217,3 +217,16 @@ async def test_a_robot_without_navigation_is_looked_at_once_when_it_has_been_the
         with pytest.raises(LinkError, match="offers no navigation"):
             await robot.send_goal(Pose(4.0, 2.0))
     assert len(n_looks) == 1
+
+
+async def test_the_clock_follows_that_of_a_robot_that_is_set_later() -> None:
+    scripted, now_s = ScriptedRobot(), [100]
+    scripted.services["/rosapi/get_time"] = lambda _: {"time": {"sec": now_s[0], "nanosec": 0}}
+    async with connected(scripted, patience=replace(PATIENT, clock_s=0.01)) as robot:
+        assert 100.0 <= robot.now_s < 150.0
+        now_s[0] = 1_795_362_623
+
+        async def is_set() -> bool:
+            return robot.now_s >= now_s[0]
+
+        await eventually(is_set)

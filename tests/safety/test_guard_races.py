@@ -191,3 +191,19 @@ async def test_only_a_clients_own_stop_latches(tmp_path: Path, stopped_by: str) 
             assert (await drives.report(drive.goal_id)).status.state is GoalState.BLOCKED
     assert fake.n_stops
     await robot.send_goal(WEST)
+
+
+class BegunAnew(FakeRobot):
+    """A simulated robot whose clock is set back after a while."""
+
+    async def sleep(self, duration_s: float) -> None:
+        await super().sleep(duration_s)
+        if self.now_s > 1_000.5:
+            self.set_clock(0.0)
+
+
+async def test_a_clock_that_is_set_back_prolongs_no_sleep(tmp_path: Path) -> None:
+    fake = BegunAnew(HALL, pose=WEST)
+    fake.set_clock(1_000.0)
+    await guarded(fake, tmp_path, PIT).sleep(2.0)
+    assert fake.now_s < 5.0

@@ -1,7 +1,9 @@
 """A skill is checked, allowed by the guard, noted, and ended in time."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
+import anyio
 import pytest
 
 from guarding import audit_of, make_guard
@@ -147,3 +149,22 @@ async def test_arguments_that_do_not_fit_are_refused_before_anything_else(tmp_pa
     with pytest.raises(SkillError, match="width"):
         await guarded.run({"width": 2}, tell_nobody)
     assert (skill.given, list(audit_of(tmp_path))) == ([], [])
+
+
+@dataclass
+class BegunAnew(FakeFacts):
+    """Facts of a simulation that is begun anew after a while."""
+
+    n_looks: int = 0
+
+    @property
+    def now_s(self) -> float:
+        self.n_looks += 1
+        return 1_000.0 + self.n_looks if self.n_looks < 4 else float(self.n_looks)
+
+
+async def test_a_clock_that_is_set_back_prolongs_no_skill() -> None:
+    guarded = SkillGate(BegunAnew(), None).hold(FakeSkill(spec(timeout_s=8.0), do=never))
+    with anyio.fail_after(20.0):
+        outcome = await guarded.run({}, tell_nobody)
+    assert outcome.state is SkillState.TIMED_OUT

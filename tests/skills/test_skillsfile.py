@@ -12,7 +12,14 @@ from mapspeak.skill import (
     SkillOutcome,
     SkillState,
 )
-from mapspeak.skills.skillsfile import READY_MADE, Called, OwnersEntry, load_skills
+from mapspeak.skills.skillsfile import (
+    READY_MADE,
+    Called,
+    OwnersEntry,
+    add_correction,
+    load_skills,
+    write_mission,
+)
 from skillmaking import FakeSkill, spec, tell_nobody
 
 FULL = """
@@ -143,3 +150,13 @@ async def test_fixed_and_free_arguments_reach_what_is_called_and_its_result_is_j
     assert (await run()).state is SkillState.FAILED
     called.outputs = {}
     assert (await run()).state is SkillState.FAILED, "what is not told does not hold"
+
+
+def test_a_mission_is_written_anew_as_a_whole(tmp_path: Path) -> None:
+    path, before = tmp_path / "round.yaml", tmp_path / "before"
+    write_mission(path, {"name": "round", "mission": [{"wait": 1}]})
+    before.hardlink_to(path)
+    add_correction(path, "round", "knock first")
+    assert "knock first" in path.read_text()
+    assert "knock first" not in before.read_text()
+    assert sorted(tmp_path.iterdir()) == [before, path]

@@ -144,6 +144,7 @@ class Patience:
             subscription made before the robot's side knew the publisher never gets the latched
             map. Empty stands for what is usual over the connection.
         later_map_s: For a map that nobody publishes, or that was waited for in vain before.
+        clock_s: Between two questions for the robot's time.
         standstill_s: Without a tick, after which a simulation's clock stands still.
         pose_silence_s: Without anything new of the pose, after which it is too old.
         first_picture_s: For the first picture of a camera that is published and has said nothing
@@ -171,6 +172,7 @@ class Patience:
     frames_s: float = 2.0
     first_map_s: tuple[float, ...] = ()
     later_map_s: float = 2.0
+    clock_s: float = 60.0
     standstill_s: float = 5.0
     pose_silence_s: float = 10.0
     first_picture_s: float = 15.0

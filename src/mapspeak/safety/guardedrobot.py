@@ -84,13 +84,16 @@ class GuardedRobot:
 
     async def sleep(self, duration_s: float) -> None:
         """Return when that much robot time has passed; a drive is watched meanwhile."""
-        deadline_s = self.now_s + duration_s
-        while self._is_watched and self.now_s < deadline_s - EPSILON_S:
-            await self._robot.sleep(min(WATCH_S, deadline_s - self.now_s))
+        left_s = duration_s
+        while self._is_watched and left_s > EPSILON_S:
+            before_s, step_s = self.now_s, min(WATCH_S, left_s)
+            await self._robot.sleep(step_s)
             await self.obey_hold()
             await self.watch()
             await self.watch_map()
-        await self._robot.sleep(max(deadline_s - self.now_s, 0.0))
+            # A simulation that is begun anew sets its clock back.
+            left_s -= max(self.now_s - before_s, step_s)
+        await self._robot.sleep(max(left_s, 0.0))
 
     @property
     def _is_watched(self) -> bool:
@@ -284,15 +287,13 @@ class GuardedRobot:
     async def _send_on(self, drive: GuardedDrive) -> None:
         if self._guard.hold.read() is not None:
             return
-        leg = drive.legs[0]
-        said = f"on to ({leg.x:.2f}, {leg.y:.2f})"
+        leg, now_s = drive.legs[0], self.now_s
         try:
-            self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
+            self._guard.note_leg(drive.permit, f"on to ({leg.x:.2f}, {leg.y:.2f})", robot_s=now_s)
             # Who gives up asking how a drive stands does not give up the drive.
             with anyio.CancelScope(shield=True):
                 drive.leg_id = await self._robot.send_goal(leg)
         except BaseException as error:
-            # Whether the robot took the leg is unknown: it must not drive unnoticed.
             cause = Cause(code=CauseCode.NOT_SENT_ON, quote=_say_error(error))
             await self._end(drive, GoalState.BLOCKED, cause)
             raise
@@ -358,11 +359,10 @@ class GuardedRobot:
 
     def _latch(self) -> None:
         """Hold the robot after a client's stop, where the policy says so."""
-        caller = current_caller()
+        caller, at = current_caller(), self._guard.wall_clock()
         if caller is NOBODY or not self._guard.policy.latches_on_stop:
             return
         try:
-            at = self._guard.wall_clock()
             self._guard.hold.put(f"{caller.tool or 'a client'} stopped it", at=at)
         except ConfigError as error:
             logger.error("%s", error)  # noqa: TRY400 - it says all there is to say

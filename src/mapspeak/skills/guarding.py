@@ -134,13 +134,15 @@ async def wait(facts: Facts, duration_s: float) -> None:
 
     It does not advance the time of a robot whose clock only moves while it sleeps.
     """
-    begun_s = seen_s = facts.now_s
-    moved_s, still_s = anyio.current_time(), 0.0
-    while seen_s - begun_s + still_s < duration_s:
+    seen_s, passed_s = facts.now_s, 0.0
+    moved_s = anyio.current_time()
+    while passed_s < duration_s:
         await anyio.sleep(LOOK_S)
         now_s, wall_s = facts.now_s, anyio.current_time()
         if now_s != seen_s:
+            # A simulation that is begun anew sets its clock back.
+            passed_s += max(now_s - seen_s, 0.0)
             seen_s, moved_s = now_s, wall_s
         elif wall_s - moved_s > STILL_S:
-            still_s += wall_s - moved_s
+            passed_s += wall_s - moved_s
             moved_s = wall_s

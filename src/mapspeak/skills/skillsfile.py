@@ -1,6 +1,7 @@
 """skills.yaml, in which the owner declares a robot's skills; saved missions are such files too."""
 
 import io
+import os
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from enum import StrEnum
@@ -298,7 +299,10 @@ def _write(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
     YAML(typ="rt").dump(tree, text)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text.getvalue(), encoding="utf-8")
+        # Renamed into place: a full disk leaves the file before.
+        unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+        unfinished.write_text(text.getvalue(), encoding="utf-8")
+        unfinished.replace(path)
     except OSError as error:
         raise ConfigError(
             f"{path} could not be written: {say_cause(error)}.", hint="Check disk and permissions."

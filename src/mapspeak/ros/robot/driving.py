@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, StampedPose
 from mapspeak.ros.actions import open_action
 from mapspeak.ros.activity import ActionGoal, ActionState
@@ -270,7 +270,12 @@ NAV2 = Navigation(
 
 ARRIVAL_M = 0.35
 """Nav2 and move_base stop within 0.25 m by default, and the pose may be a step behind."""
+ARRIVAL_RAD = 0.35
+"""Nav2 stops within 0.25 rad by default."""
 STANDING_M = 0.05
+STANDING_RAD = 0.05
+TURN_S = 5.0
+"""A robot that has stood at its goal for this time does not turn any more."""
 GIVEN_UP_S = 20.0
 """A robot that has stood still for this time has come as far as it could."""
 
@@ -299,7 +304,7 @@ class GoalTopicDriver:
         self._fetch_pose = fetch_pose
         self._now_s = now_s
         self._current: GoalRecord | None = None
-        self._moved: tuple[Point, float] | None = None
+        self._moved: tuple[Pose, float] | None = None
         """The last pose in motion, and its time."""
         connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
         connection.started.actions[topic] = self
@@ -334,11 +339,12 @@ class GoalTopicDriver:
         """Judge by the robot's pose how the goal stands."""
         if record is not self._current or record.is_over:
             return
-        place = (await self._fetch_pose()).pose.point
-        left_m = place.distance_to(record.goal.point)
+        here = (await self._fetch_pose()).pose
+        left_m = here.point.distance_to(record.goal.point)
         record.drive(distance_left_m=left_m)
-        stood_s = self._stood_for_s(place)
-        if left_m <= ARRIVAL_M and stood_s > 0.0:
+        stood_s = self._stood_for_s(here)
+        is_turned = abs(wrap_angle(record.goal.yaw_rad - here.yaw_rad)) <= ARRIVAL_RAD
+        if left_m <= ARRIVAL_M and stood_s > (0.0 if is_turned else TURN_S):
             record.end(GoalState.ARRIVED)
         elif stood_s > GIVEN_UP_S:
             code = CauseCode.STOOD_STILL
@@ -362,8 +368,13 @@ class GoalTopicDriver:
         pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
         await self._connection.publish(self._topic, write_pose_stamped(pose, dialect=self._dialect))
 
-    def _stood_for_s(self, place: Point) -> float:
+    def _stood_for_s(self, here: Pose) -> float:
         now_s = self._now_s()
-        if self._moved is None or place.distance_to(self._moved[0]) > STANDING_M:
-            self._moved = (place, now_s)
+        if self._moved is None or _has_moved(self._moved[0], here):
+            self._moved = (here, now_s)
         return max(now_s - self._moved[1], 0.0)
+
+
+def _has_moved(before: Pose, now: Pose) -> bool:
+    turned_rad = abs(wrap_angle(now.yaw_rad - before.yaw_rad))
+    return now.point.distance_to(before.point) > STANDING_M or turned_rad > STANDING_RAD

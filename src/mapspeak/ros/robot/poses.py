@@ -23,6 +23,8 @@ FIRST_TICK_S = 1.0
 """A clock topic that stays silent for this time is left over from something else."""
 ASK_AGAIN_S = 1.0
 """The node that tells the time may be found only after we have connected."""
+OFF_S = 0.3
+"""An answer may take as long: what differs less leaves the clock as it runs."""
 STILL_S = 2.0
 """Wall time after which a simulated clock that has not moved on counts as still."""
 EPSILON_S = 1e-6
@@ -34,6 +36,7 @@ class RobotClock:
     def __init__(self, connection: RosConnection) -> None:
         self._connection = connection
         self._standstill_s = connection.patience.standstill_s
+        self._again_s = connection.patience.clock_s
         self._offset_s: float | None = None
         self._simulated_s: float | None = None
         self._ticked_s = 0.0
@@ -64,11 +67,15 @@ class RobotClock:
             with anyio.move_on_after(FIRST_TICK_S):
                 await self._moved_on.wait()
 
-    async def set_late(self) -> None:
-        """Ask until the robot has told its time; for the background."""
-        while not self.is_set:
-            await anyio.sleep(ASK_AGAIN_S)
-            await self._ask_the_time()
+    async def keep_set(self) -> None:
+        """Ask until the robot has told its time, then now and then; for the background.
+
+        Clocks drift apart, and a robot's is set when it finds a time server.
+        """
+        while True:
+            await anyio.sleep(self._again_s if self.is_set else ASK_AGAIN_S)
+            if self._simulated_s is None:
+                await self._ask_the_time()
 
     async def sleep(self, duration_s: float) -> None:
         """Return when that much robot time has passed.
@@ -91,8 +98,11 @@ class RobotClock:
             robot_s = await self._connection.fetch_time_s()
         except LinkError:
             return
-        if robot_s is not None:
-            self._offset_s = robot_s - anyio.current_time()
+        if robot_s is None:
+            return
+        offset_s = robot_s - anyio.current_time()
+        if self._offset_s is None or abs(offset_s - self._offset_s) > OFF_S:
+            self._offset_s = offset_s
 
     async def _wait_for_tick(self) -> None:
         with anyio.move_on_after(self._standstill_s):

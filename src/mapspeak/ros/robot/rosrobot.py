@@ -333,5 +333,5 @@ async def build_ros_robot(
     await clock.start(watch.profile.clock_topic)
     robot = RosRobot(connection, watch, frames=frames, clock=clock)
     connection.start_soon(watch.run)
-    connection.start_soon(clock.set_late)
+    connection.start_soon(clock.keep_set)
     return robot
