@@ -42,7 +42,7 @@ def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[B
     side = max(round(THINNEST_UNKNOWN_M / grid.resolution_m), 1)
     edge = _edge(grid.unknown.view(np.uint8), free, side=side)
     labels = _labelled(edge, free, reach=round(JOIN_M / grid.resolution_m))
-    cells = np.flatnonzero(edge)
+    cells = np.flatnonzero(edge.view(np.bool_))
     of_cell = labels.ravel()[cells]
     order = np.argsort(of_cell, kind="stable")
     starts = np.flatnonzero(np.diff(of_cell[order], prepend=0))

@@ -4,6 +4,7 @@ Every cell belongs to the peak of clearance that steepest ascent leads to. Where
 the highest way over is a pass: a door, a gap beside furniture, or nothing at all.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -37,16 +38,13 @@ class Basins:
     Attributes:
         labels: For each floor cell the number of its basin, from 1; 0 elsewhere.
         ascent: For each cell of the flat picture the steepest higher neighbour, or itself.
+        peaks: The flat cells of floor that no neighbour is higher than.
     """
 
     heights: Heights
     labels: BasinLabels
     ascent: IntArray
-
-    def find_peaks(self) -> IntArray:
-        """Return the flat cells of floor that no neighbour is higher than."""
-        is_peak = (self.ascent == np.arange(self.ascent.size)) & (self.labels.ravel() > 0)
-        return np.flatnonzero(is_peak)
+    peaks: IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -64,33 +62,37 @@ class Passes:
 
 def build_basins(heights: Heights, floor: Picture) -> Basins:
     """Divide the floor into the basins of its peaks."""
-    own = np.arange(floor.size)
-    ascent = own + _steepest_steps(heights).ravel()
-    peaks = floor & (ascent == own).reshape(floor.shape)
+    steepest = _find_steepest(heights) * floor
+    steps = np.array([down * floor.shape[1] + right for down, right in ((0, 0), *_NEIGHBOURS)])
+    ascent = np.take(steps, steepest.ravel(), mode="clip")
+    ascent += np.arange(floor.size)
+    peaks = floor & (steepest == 0)
     _, peak_label = cv2.connectedComponents(peaks, connectivity=8)
-    labels = np.asarray(peak_label, np.int32).ravel()[_follow(ascent)].reshape(floor.shape)
-    labels[floor == 0] = 0
-    return Basins(heights=heights, labels=labels, ascent=ascent)
+    # Cells off the floor lead nowhere, and are no peaks.
+    labels = np.take(np.asarray(peak_label, np.int32), _follow(ascent)).reshape(floor.shape)
+    found = np.flatnonzero(peaks.view(np.bool_))
+    return Basins(heights=heights, labels=labels, ascent=ascent, peaks=found)
 
 
-def _steepest_steps(heights: Heights) -> NDArray[np.int32]:
-    """Return for each cell the step in the flat array to its steepest higher neighbour, or 0."""
+_NEIGHBOURS = tuple(way for way in itertools.product((-1, 0, 1), repeat=2) if any(way))
+"""The steps down and right to the cells around one."""
+
+
+def _find_steepest(heights: Heights) -> Picture:
+    """Return for each cell which neighbour is the steepest higher one, from 1, or 0 for none."""
     rows, cols = heights.shape
     framed = cv2.copyMakeBorder(heights, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     steepest = np.zeros_like(heights)
-    step = np.zeros(heights.shape, np.int32)
+    number = np.zeros(heights.shape, np.uint8)
     slope = np.empty_like(heights)
-    for down in (-1, 0, 1):
-        for right in (-1, 0, 1):
-            if down == right == 0:
-                continue
-            there = framed[1 + down : 1 + down + rows, 1 + right : 1 + right + cols]
-            np.subtract(there, heights, out=slope)
-            slope *= np.float32(1 / math.hypot(down, right))
-            steeper = slope > steepest
-            np.copyto(steepest, slope, where=steeper)
-            np.copyto(step, np.int32(down * cols + right), where=steeper)
-    return step
+    for each, (down, right) in enumerate(_NEIGHBOURS, start=1):
+        there = framed[1 + down : 1 + down + rows, 1 + right : 1 + right + cols]
+        np.subtract(there, heights, out=slope)
+        slope *= np.float32(1 / math.hypot(down, right))
+        # The last to be steeper than all before has the highest number.
+        np.maximum(number, (slope > steepest) * np.uint8(each), out=number)
+        np.maximum(steepest, slope, out=steepest)
+    return number
 
 
 def _follow(pointer: IntArray) -> IntArray:

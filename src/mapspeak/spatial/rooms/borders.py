@@ -5,9 +5,8 @@ maxima over its basins, so that a join needs no access to the floor.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapspeak.spatial.grid import FloatArray, IntArray
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms.basins import (
     CONTACT,
     FIRST,
@@ -20,7 +19,7 @@ from mapspeak.spatial.rooms.basins import (
     Basins,
     Passes,
 )
-from mapspeak.spatial.rooms.raster import Raster
+from mapspeak.spatial.rooms.raster import Raster, find_cells
 
 MEASURES = (
     "half_width_m",
@@ -78,8 +77,8 @@ class PlaceGraph:
         self._cell_size_m = raster.cell_size_m
         self._sums = _sum_up(basins, raster, n)
         self._peak_m = np.zeros(n)
-        peaks = basins.find_peaks()
-        np.maximum.at(self._peak_m, basins.labels.ravel()[peaks], basins.heights.ravel()[peaks])
+        of_peak, height_m = (part.ravel()[basins.peaks] for part in (basins.labels, basins.heights))
+        np.maximum.at(self._peak_m, of_peak, height_m)
         self._place_of = np.arange(n)
         self._borders = passes.values.copy()
         self.neighbours: list[dict[int, int]] = [{} for _ in range(n)]
@@ -214,27 +213,37 @@ class PlaceGraph:
 
 def _sum_up(basins: Basins, raster: Raster, n: int) -> FloatArray:
     """Return for each basin how many cells it has, their moments, clearances and outer edges."""
-    labels = basins.labels
-    cells = np.flatnonzero(labels)
-    flat = labels.ravel()[cells]
-    row, col = (axis.astype(np.float64) for axis in np.divmod(cells, labels.shape[1]))
-    moments = (None, row, col, row**2, col**2, row * col, basins.heights.ravel()[cells])
-    sums = [np.bincount(flat, weights=weights, minlength=n) for weights in moments]
-    unseen = ((raster.free | raster.occupied) == 0).astype(np.float64)
-    return np.stack([*sums, *_count_edges(labels, unseen, n)]).astype(np.float64)
+    unseen = (raster.free | raster.occupied) == 0
+    # By runs of cells along rows; the column added divides the rows.
+    labels = np.pad(basins.labels, ((0, 0), (1, 0)))
+    starts = np.flatnonzero(labels.ravel()[1:] != labels.ravel()[:-1]) + 1
+    of_run = labels.ravel()[starts]
+    row, first = np.divmod(starts, labels.shape[1])
+    length = np.diff(starts, append=labels.size)
+    heights = np.pad(basins.heights, ((0, 0), (1, 0))).ravel()
+    clearance = np.add.reduceat(heights, starts, dtype=np.float64) if starts.size else starts
+    middle = first - 1 + (length - 1) / 2
+    # The squares of a run's columns sum up to that of its middle, and of a run around 0.
+    squares = length * (middle**2 + (length**2 - 1) / 12)
+    moments = (length * row, length * middle, length * row**2, squares, length * row * middle)
+    sums = [
+        np.bincount(of_run, weights=each, minlength=n) for each in (length, *moments, clearance)
+    ]
+    found = np.stack([*sums, *_count_edges(basins.labels, unseen, n)])
+    found[:, 0] = 0.0
+    return found
 
 
-def _count_edges(
-    labels: BasinLabels, unseen: NDArray[np.float64], n: int
-) -> tuple[FloatArray, FloatArray]:
+def _count_edges(labels: BasinLabels, unseen: Mask, n: int) -> tuple[FloatArray, FloatArray]:
     """Return for each basin how many of its cells' sides face no floor, and what is not seen."""
     edge, edge_unseen = np.zeros(n), np.zeros(n)
+    is_floor = labels > 0
     for here, there in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
-        for one, other in ((here, there), (there, here)):
-            is_edge = (labels[one] > 0) & (labels[other] == 0)
-            edge += np.bincount(labels[one][is_edge], minlength=n)
-            weights = unseen[other][is_edge]
-            edge_unseen += np.bincount(labels[one][is_edge], weights=weights, minlength=n)
+        places = find_cells(is_floor[here] != is_floor[there])
+        one, other = labels[here][places], labels[there][places]
+        faces_unseen = np.where(one > 0, unseen[there][places], unseen[here][places])
+        edge += np.bincount(one + other, minlength=n)
+        edge_unseen += np.bincount(one + other, weights=faces_unseen, minlength=n)
     return edge, edge_unseen
 
 

@@ -13,7 +13,13 @@ from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask, OccupancyGrid, Window
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
-from mapspeak.spatial.rooms.raster import SETTINGS, Raster, build_raster, find_cells
+from mapspeak.spatial.rooms.raster import (
+    SETTINGS,
+    Raster,
+    build_raster,
+    find_boxes,
+    find_cells,
+)
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
@@ -68,21 +74,9 @@ def measure_regions(segmentation: Segmentation) -> list[RegionShape]:
 
 
 def _find_windows(labels: NDArray[np.int32]) -> list[Window]:
-    n = int(labels.max(initial=0))
-    if n == 0:
-        return []
-    framed = np.pad(labels, ((0, 0), (1, 1)))
-    rows, cols = find_cells(framed[:, 1:] != framed[:, :-1])
-    low = np.full((2, n + 1), max(labels.shape), np.intp)
-    high = np.zeros((2, n + 1), np.intp)
-    for number in (framed[rows, cols], framed[rows, cols + 1]):
-        for axis, (first, last) in enumerate(((rows, rows + 1), (cols, cols))):
-            np.minimum.at(low[axis], number, first)
-            np.maximum.at(high[axis], number, last)
-    return [
-        (slice(int(low[0, i]), int(high[0, i])), slice(int(low[1, i]), int(high[1, i])))
-        for i in range(1, n + 1)
-    ]
+    low, high = find_boxes(labels, int(labels.max(initial=0)) + 1)
+    boxes = zip(low.T[1:].tolist(), high.T[1:].tolist(), strict=True)
+    return [(slice(top, bottom), slice(left, right)) for (top, left), (bottom, right) in boxes]
 
 
 def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionShape:

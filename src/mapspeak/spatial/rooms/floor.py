@@ -20,6 +20,7 @@ from mapspeak.spatial.rooms.raster import (
     Raster,
     build_raster,
     drop_specks,
+    find_boxes,
     find_cells,
 )
 
@@ -75,6 +76,8 @@ def build_cleared(grid: OccupancyGrid) -> Mask:
 
 def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
     """Return the floor without the cells that are set, and its clearances; the walls stay."""
+    if not cut.any():
+        return floor
     rest = floor.floor & (1 - cut)
     return replace(floor, floor=rest, clearance_m=_clearance(rest, cell_size_m))
 
@@ -89,30 +92,25 @@ def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
 def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
     """Return the small unseen areas that border on floor more than on wall."""
     unseen = (1 - floor) & (1 - wall)
-    n, label, stats, _ = cv2.connectedComponentsWithStats(unseen, connectivity=4)
-    small = stats[:, cv2.CC_STAT_AREA] < largest
+    n, label = cv2.connectedComponents(unseen, connectivity=4)
+    small = np.bincount(label.ravel(), minlength=n) < largest
     small[0] = False
     border = np.zeros(n)
     at_wall = np.zeros(n)
-    for here, there in _NEIGHBOURS:
-        rows, cols = find_cells((unseen[here] > 0) & (unseen[there] == 0))
-        pocket = label[here][rows, cols]
+    for here, there in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
+        places = find_cells(unseen[here] != unseen[there])
+        # One of the two is in a pocket, and at most the other is wall.
+        pocket = label[here][places] + label[there][places]
         border += np.bincount(pocket, minlength=n)
-        at_wall += np.bincount(pocket, weights=wall[there][rows, cols], minlength=n)
+        weights = wall[here][places] | wall[there][places]
+        at_wall += np.bincount(pocket, weights=weights, minlength=n)
     is_pocket = small & (at_wall <= border / 2)
-    return np.asarray(is_pocket[label], np.uint8)
-
-
-_NEIGHBOURS = (
-    (np.s_[:-1, :], np.s_[1:, :]),
-    (np.s_[1:, :], np.s_[:-1, :]),
-    (np.s_[:, :-1], np.s_[:, 1:]),
-    (np.s_[:, 1:], np.s_[:, :-1]),
-)
-"""The cells that have a neighbour below, above, right and left; and those neighbours."""
+    return np.take(is_pocket.view(np.uint8), label)
 
 
 OBLIQUE_STEP_DEG = 7.5
+_SIEVE, _FEW_CELLS = 5, 500
+"""Every so many cells of a line are tried first; then so many cells are looked at one by one."""
 SLENDER_RATIO = 0.37
 """Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
 
@@ -150,9 +148,21 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
 
 def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
     kernel = _line(length, angle_deg)
-    core = np.asarray(cv2.erode(picture, kernel), np.uint8)
-    # Most directions match nothing.
-    return np.asarray(cv2.dilate(core, kernel), np.uint8) if core.any() else core
+    # A line is nowhere that some cells of it are not; most directions match next to nothing.
+    some = kernel * (np.cumsum(kernel).reshape(kernel.shape) % _SIEVE == 0)
+    cells = np.flatnonzero(np.asarray(cv2.erode(picture, some)).view(np.bool_))
+    if cells.size > _FEW_CELLS:
+        core = cv2.erode(picture, kernel)
+        return np.asarray(cv2.dilate(core, kernel), np.uint8)
+    high, wide = (side // 2 for side in kernel.shape)
+    framed = cv2.copyMakeBorder(picture, high, high, wide, wide, cv2.BORDER_CONSTANT, value=1)
+    rows, cols = np.divmod(cells, picture.shape[1])
+    middles = (rows + high) * framed.shape[1] + cols + wide
+    steps = (np.nonzero(kernel)[0] - high) * framed.shape[1] + np.nonzero(kernel)[1] - wide
+    is_line = framed.ravel()[middles[:, np.newaxis] + steps].all(axis=1)
+    opened = np.zeros_like(framed)
+    opened.ravel()[middles[is_line, np.newaxis] - steps] = 1
+    return opened[high : high + picture.shape[0], wide : wide + picture.shape[1]]
 
 
 def _line(length: float, angle_deg: float) -> Picture:
@@ -174,10 +184,12 @@ def _sort_obstacles(free: Picture, largest_island: float) -> tuple[Picture, Pict
     chair and a box are not.
     """
     solid = cv2.copyMakeBorder(1 - free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
-    _, label, stats, _ = cv2.connectedComponentsWithStats(solid, connectivity=8)
-    label = label[1:-1, 1:-1]
-    across = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    n, label = cv2.connectedComponents(solid, connectivity=8)
+    low, high = find_boxes(label, n)
+    across = np.hypot(*(high - low))
     is_large = across >= largest_island
-    is_slender = stats[:, cv2.CC_STAT_AREA] <= SLENDER_RATIO * across**2
+    is_slender = np.bincount(label.ravel(), minlength=n) <= SLENDER_RATIO * across**2
     is_large[0] = is_slender[0] = False
-    return is_large.astype(np.uint8)[label], is_slender.astype(np.uint8)[label]
+    label = label[1:-1, 1:-1]
+    large, slender = (np.take(kept.view(np.uint8), label) for kept in (is_large, is_slender))
+    return large, slender

@@ -15,6 +15,7 @@ from mapspeak.spatial.rooms.raster import (
     Truths,
     drop_small,
     drop_specks,
+    find_boxes,
     find_fixed,
     is_near,
     is_short,
@@ -46,7 +47,9 @@ def find_blocks(raster: Raster, wall: Picture) -> tuple[Picture, Picture]:
         wall: 1 on presumed wall; only wall continues behind furniture.
     """
     solid = 1 - drop_specks(raster.free, _SPECK_M2 / raster.cell_area_m2)
-    block, behind = _find_blocks(solid, wall, _Sizes(solid, raster.cell_size_m))
+    joined = find_fixed(solid)
+    sizes = _Sizes(solid, joined, raster.cell_size_m)
+    block, behind = _find_blocks(solid, wall, sizes, joined)
     return block, behind & (1 - block)
 
 
@@ -61,11 +64,11 @@ class _Sizes:
         tip: Largest distance from the middle of a wall to floor.
     """
 
-    def __init__(self, solid: Picture, cell_size_m: float) -> None:
+    def __init__(self, solid: Picture, fixed: Picture, cell_size_m: float) -> None:
         self.depth = round(SETTINGS.block_depth_m / cell_size_m) | 1
         self.thick = round(SETTINGS.block_thickness_m / cell_size_m) | 1
         wall = SETTINGS.block_ratio * _find_wall_thickness(
-            solid, self.thick, 2 * SETTINGS.oblique_length_m / cell_size_m
+            solid, fixed, self.thick, 2 * SETTINGS.oblique_length_m / cell_size_m
         )
         self.thin = max(round(SETTINGS.block_depth_m / cell_size_m) + 2, round(wall)) | 1
         self.long = round(SETTINGS.block_length_m / cell_size_m)
@@ -75,9 +78,8 @@ class _Sizes:
         self.crumb = _CRUMB_M / cell_size_m
 
 
-def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
+def _find_wall_thickness(solid: Picture, fixed: Picture, most: int, least: float) -> float:
     """Return how thick walls mostly are, in cells: what has floor on two sides and is fixed."""
-    fixed = find_fixed(solid)
     found = []
     for axis in (0, 1):
         first, length = run_lengths(solid, axis)
@@ -88,7 +90,14 @@ def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
     return float(np.median(all_of_them)) if all_of_them.size >= least else 0.0
 
 
-def _find_blocks(solid: Picture, seen_wall: Picture, cells: _Sizes) -> tuple[Picture, Picture]:
+def _find_blocks(
+    solid: Picture, seen_wall: Picture, cells: _Sizes, joined: Picture
+) -> tuple[Picture, Picture]:
+    """Return the same as `find_blocks`.
+
+    Args:
+        joined: 1 on what is connected to the outside of the picture.
+    """
     if cells.thin >= cells.thick:
         return np.zeros_like(solid), np.zeros_like(solid)
     bump = open_box(_find_bumps(solid, cells), cells.thin, cells.thin)
@@ -100,7 +109,7 @@ def _find_blocks(solid: Picture, seen_wall: Picture, cells: _Sizes) -> tuple[Pic
     fixed = drop_small(rest, cells.crumb)
     block = _choose_blocks(piece, fixed, solid, cells)
     crumb = rest & (1 - fixed)
-    block |= _find_touching(crumb & (1 - find_fixed(solid)), block)
+    block |= _find_touching(crumb & (1 - joined), block)
     block |= widen(block, cells.rim) & crumb
     return block, wall & widen(block, cells.tip)
 
@@ -190,24 +199,17 @@ def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells:
     near = widen(piece, cells.tip) & floor
     _, stretch = cv2.connectedComponents(near, connectivity=4)
     here = (near > 0) & (around > 0)
-    pairs, counts = np.unique(np.stack([around[here], stretch[here]]), axis=1, return_counts=True)
+    pairs, counts = np.unique(stretch[here] * np.int64(n) + around[here], return_counts=True)
     least = max(cells.rim, 1)
-    return np.bincount(pairs[0][counts >= least], minlength=n)
+    return np.bincount(pairs[counts >= least] % n, minlength=n)
 
 
 def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:
     """Return True for each piece that fills the rectangle around it and is not too long."""
-    inside = np.flatnonzero(label)
-    rows, cols = np.divmod(inside, label.shape[1])
-    number = label.ravel()[inside]
-    spans = []
-    for place in (rows, cols):
-        low, high = np.full(n, max(label.shape)), np.zeros(n, np.intp)
-        np.minimum.at(low, number, place)
-        np.maximum.at(high, number, place)
-        spans.append(high - low + 1)
+    low, high = find_boxes(label, n)
+    spans = high - low
     is_whole = np.maximum(*spans) < _WHOLE_RATIO * cells.long
-    filled = np.bincount(number, minlength=n) >= _FILLED_RATIO * spans[0] * spans[1]
+    filled = np.bincount(label.ravel(), minlength=n) >= _FILLED_RATIO * spans[0] * spans[1]
     return np.asarray(is_whole & filled)
 
 

@@ -325,22 +325,34 @@ def run_lengths(solid: Picture, axis: int) -> tuple[NDArray[np.intp], NDArray[np
     return (row * lines.shape[1] + col)[ends], (stop - first)[ends]
 
 
+def find_boxes(label: Numbers, n: int) -> tuple[Places, Places]:
+    """Return where the box around each of n numbers begins and stops, (rows, columns) of (2, n)."""
+    framed = np.pad(label, ((0, 0), (1, 1)))
+    rows, cols = find_cells(framed[:, 1:] != framed[:, :-1])
+    low, high = np.full((2, n), max(label.shape)), np.zeros((2, n), np.intp)
+    for number in (framed[rows, cols], framed[rows, cols + 1]):
+        for axis, (first, last) in enumerate(((rows, rows + 1), (cols, cols))):
+            np.minimum.at(low[axis], number, first)
+            np.maximum.at(high[axis], number, last)
+    return low, high
+
+
 def drop_specks(free: Picture, least: float) -> Picture:
     """Return the floor without parts of fewer cells."""
-    _, label, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
-    is_kept = stats[:, cv2.CC_STAT_AREA] >= least
+    n, label = cv2.connectedComponents(free, connectivity=4)
+    is_kept = np.bincount(label.ravel(), minlength=n) >= least
     is_kept[0] = False
-    return np.asarray(is_kept[label], np.uint8)
+    return np.take(is_kept.view(np.uint8), label)
 
 
 def drop_small(solid: Picture, least: float) -> Picture:
     """Return solid cells without smaller pieces that have floor all around."""
     framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
-    _, label, stats, _ = cv2.connectedComponentsWithStats(framed, connectivity=8)
-    across = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    is_kept = across >= least
+    n, label = cv2.connectedComponents(framed, connectivity=8)
+    low, high = find_boxes(label, n)
+    is_kept = np.hypot(*(high - low)) >= least
     is_kept[0] = False
-    return np.asarray(is_kept[label[1:-1, 1:-1]], np.uint8)
+    return np.take(is_kept.view(np.uint8), label[1:-1, 1:-1])
 
 
 def find_fixed(solid: Picture) -> Picture:
