@@ -26,10 +26,10 @@ from mapspeak import __version__
 from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
-from mapspeak.server.remarks import Remarks
+from mapspeak.server.remarks import Remarks, shorten_report, show_controls_of
 from mapspeak.server.reports.representations import Representation
 from mapspeak.server.text.offered import offering, say_error, write_instructions
-from mapspeak.server.text.wording import shorten_report, show_controls, show_controls_of
+from mapspeak.server.text.wording import show_controls
 from mapspeak.server.tools.asking import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.skills.board import SkillBoard

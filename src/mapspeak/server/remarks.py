@@ -1,5 +1,9 @@
-"""Remarks added to an answer: the earlier memory, and ids that mean something else by now."""
+"""The last that is done to an answer: remarks are added, and it is made short and harmless.
 
+Remarks tell of the earlier memory, and of ids that mean something else by now.
+"""
+
+import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -9,7 +13,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.memory import SemanticMap
 from mapspeak.places.naming import REGION_ID, find_renamed
 from mapspeak.server.text.memory import say_loaded
-from mapspeak.server.text.wording import say_renamed
+from mapspeak.server.text.wording import say_renamed, show_controls
 from mapspeak.session import Session
 
 
@@ -81,3 +85,54 @@ def _list_texts(value: object) -> Iterator[str]:
         case list():
             for each in value:
                 yield from _list_texts(each)
+
+
+def shorten_report(answer: CallToolResult) -> CallToolResult:
+    """Return an answer whose report is one line of text, without what is empty in it."""
+    report = answer.structured_content
+    content = [
+        part.model_copy(update={"text": _say_report(report)})
+        if isinstance(part, TextContent) and report and part.text.startswith("{")
+        else part
+        for part in answer.content
+    ]
+    return answer.model_copy(update={"content": content})
+
+
+def _say_report(report: Any) -> str:  # noqa: ANN401 - JSON of any shape
+    return json.dumps(_without_empty(report), ensure_ascii=False, separators=(",", ":"))
+
+
+def _without_empty(value: Any) -> Any:  # noqa: ANN401 - JSON of any shape
+    match value:
+        case Mapping():
+            kept = {key: _without_empty(each) for key, each in value.items()}
+            return {key: each for key, each in kept.items() if each not in (None, "", [], {})}
+        case list():
+            return [_without_empty(each) for each in value]
+        case _:
+            return value
+
+
+def show_controls_of(answer: CallToolResult) -> CallToolResult:
+    """Return an answer with every control sign in it as it is written in JSON."""
+    content = [
+        part.model_copy(update={"text": show_controls(part.text)})
+        if isinstance(part, TextContent)
+        else part
+        for part in answer.content
+    ]
+    structured = _show_within(answer.structured_content)
+    return answer.model_copy(update={"content": content, "structured_content": structured})
+
+
+def _show_within(value: Any) -> Any:  # noqa: ANN401 - JSON of any shape
+    match value:
+        case str():
+            return show_controls(value)
+        case Mapping():
+            return {key: _show_within(each) for key, each in value.items()}
+        case list():
+            return [_show_within(each) for each in value]
+        case _:
+            return value

@@ -1,12 +1,9 @@
 """Numbers, places and ways as people and models read them; control signs made visible."""
 
-import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeVar
-
-from mcp_types import CallToolResult, TextContent
+from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import SemanticMap
@@ -225,54 +222,3 @@ CONTROL = re.compile(
 def show_controls(text: str) -> str:
     """Return a text with every control sign as it is written in JSON, such as u001b."""
     return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
-
-
-def shorten_report(answer: CallToolResult) -> CallToolResult:
-    """Return an answer whose report is one line of text, without what is empty in it."""
-    report = answer.structured_content
-    content = [
-        part.model_copy(update={"text": _say_report(report)})
-        if isinstance(part, TextContent) and report and part.text.startswith("{")
-        else part
-        for part in answer.content
-    ]
-    return answer.model_copy(update={"content": content})
-
-
-def _say_report(report: Any) -> str:  # noqa: ANN401 - JSON of any shape
-    return json.dumps(_without_empty(report), ensure_ascii=False, separators=(",", ":"))
-
-
-def _without_empty(value: Any) -> Any:  # noqa: ANN401 - JSON of any shape
-    match value:
-        case Mapping():
-            kept = {key: _without_empty(each) for key, each in value.items()}
-            return {key: each for key, each in kept.items() if each not in (None, "", [], {})}
-        case list():
-            return [_without_empty(each) for each in value]
-        case _:
-            return value
-
-
-def show_controls_of(answer: CallToolResult) -> CallToolResult:
-    """Return a tool's answer likewise."""
-    content = [
-        part.model_copy(update={"text": show_controls(part.text)})
-        if isinstance(part, TextContent)
-        else part
-        for part in answer.content
-    ]
-    structured = _show_within(answer.structured_content)
-    return answer.model_copy(update={"content": content, "structured_content": structured})
-
-
-def _show_within(value: Any) -> Any:  # noqa: ANN401 - JSON of any shape
-    match value:
-        case str():
-            return show_controls(value)
-        case Mapping():
-            return {key: _show_within(each) for key, each in value.items()}
-        case list():
-            return [_show_within(each) for each in value]
-        case _:
-            return value
