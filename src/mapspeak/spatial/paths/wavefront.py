@@ -24,8 +24,6 @@ STEPS = np.array([1.0] * 4 + [math.sqrt(2.0)] * 4, dtype=np.float32)
 """The length of a move in each direction, in cells."""
 ROUNDING = 1e-3
 """Tolerance between two costs of the same way, in cells and as a share."""
-FEW_BUCKETS = 8
-"""Up to this many buckets are searched one by one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,8 +60,9 @@ def spread(
         goals: Stop once all these cells are settled.
     """
     front = _Front(moves, None if weights is None else weights.ravel(), seeds)
-    while (ring := front.next_ring()) is not None:
-        if goals is not None and front.is_settled[goals].all():
+    while front.waiting.size:
+        ring, limit = front.take_ring()
+        if goals is not None and (front.costs[goals] < limit).all():
             break
         front.advance(ring)
     return front.costs
@@ -96,63 +95,44 @@ def descend(moves: Moves, weights: Costs | None, costs: Costs, goal: int) -> Int
 
 
 class _Front:
-    """State of the wave: costs so far, and the cells waiting in their buckets."""
+    """State of the wave: costs so far, and the cells reached that are not settled, each once."""
 
     def __init__(self, moves: Moves, weights: Costs | None, seeds: Seeds) -> None:
         n_cells = moves.size
         self.costs: Costs = np.full(n_cells, np.inf, dtype=np.float32)
-        self.is_settled = np.zeros(n_cells, dtype=np.bool_)
+        self.costs[seeds.cells] = seeds.costs
+        self.waiting = seeds.cells
         self._moves = moves.ravel()
         self._weights = weights
         self._offsets = offsets(moves.shape[1])[:, None]
         self._last_writer = np.zeros(n_cells, dtype=np.int32)
-        self._waiting: dict[int, list[IntArray]] = {}
-        self.costs[seeds.cells] = seeds.costs
-        self._wait(seeds.cells, seeds.costs)
 
-    def next_ring(self) -> IntArray | None:
-        """Take the cells of the next bucket that holds any, each once, and settle them."""
-        while self._waiting:
-            cells = np.concatenate(self._waiting.pop(min(self._waiting)))
-            cells = cells[~self.is_settled[cells]]
-            order = np.arange(cells.size, dtype=np.int32)
-            # Each once: the last writer wins.
-            self._last_writer[cells] = order
-            cells = np.asarray(cells[self._last_writer[cells] == order])
-            if cells.size:
-                self.is_settled[cells] = True
-                return cells
-        return None
+    def take_ring(self) -> tuple[IntArray, int]:
+        """Take the cells of the next bucket that holds any; return them and its upper limit."""
+        costs = self.costs.take(self.waiting)
+        limit = int(costs.min()) + 1
+        is_now = costs < limit
+        ring, self.waiting = self.waiting[is_now], self.waiting[~is_now]
+        return ring, limit
 
     def advance(self, ring: IntArray) -> None:
         """Move from the ring's cells to their neighbours where that is cheaper than so far."""
-        costs = self.costs[ring] + self._move_costs(ring)
-        targets = ring + self._offsets
-        is_better = ((self._moves[ring] & BITS[:, None]) != 0) & (
-            costs < self.costs.take(targets, mode="clip")
-        )
-        reached = targets[is_better]
-        np.minimum.at(self.costs, reached, costs[is_better])
-        self._wait(reached, self.costs[reached])
+        costs = (self.costs.take(ring) + self._move_costs(ring)).ravel()
+        targets = (ring + self._offsets).ravel()
+        is_better = ((self._moves.take(ring) & BITS[:, None]) != 0).ravel()
+        is_better &= costs < self.costs.take(targets, mode="clip")
+        better = np.flatnonzero(is_better)
+        reached = targets.take(better)
+        new = reached[self.costs.take(reached) == np.inf]
+        np.minimum.at(self.costs, reached, costs.take(better))
+        # Each once: the last writer wins.
+        order = np.arange(new.size, dtype=np.int32)
+        self._last_writer[new] = order
+        self.waiting = np.concatenate([self.waiting, new[self._last_writer.take(new) == order]])
 
     def _move_costs(self, ring: IntArray) -> Costs:
         if self._weights is None:
             return STEPS[:, None]
         ends = self._weights.take(ring + self._offsets, mode="clip")
-        means = (self._weights[ring] + ends) * np.float32(0.5)
+        means = (self._weights.take(ring) + ends) * np.float32(0.5)
         return np.asarray(STEPS[:, None] * means, dtype=np.float32)
-
-    def _wait(self, cells: IntArray, costs: Costs) -> None:
-        if not cells.size:
-            return
-        buckets = costs.astype(np.intp)
-        first, last = int(buckets.min()), int(buckets.max())
-        if first == last:
-            self._waiting.setdefault(first, []).append(cells)
-            return
-        # Where a wall costs thousands, almost all buckets between two costs are empty.
-        filled = range(first, last + 1) if last - first < FEW_BUCKETS else np.unique(buckets)
-        for bucket in filled:
-            chosen = cells[buckets == bucket]
-            if chosen.size:
-                self._waiting.setdefault(int(bucket), []).append(chosen)

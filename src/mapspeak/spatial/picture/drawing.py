@@ -112,8 +112,9 @@ def draw_map(
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
     inside[:] = paint_ground(grid, view)
-    regions = _no_regions(view)
-    if layers.regions is not None:
+    if layers.regions is None:
+        regions = _no_regions(view)
+    else:
         if layers.regions.labels.shape != grid.cells.shape:
             raise MapError(
                 f"The regions cover {layers.regions.labels.shape} cells, the map has "

@@ -229,7 +229,9 @@ class _Search:
 
         The labels of points that stand there move.
         """
-        spot, wish = self._find_inside(label), self.wishes[label]
+        wish = self.wishes[label]
+        # Nothing inside is better than what was wished for while no label was placed.
+        spot = wish if self._taken.is_free(wish.box) else self._find_inside(label)
         in_its_way: list[Placed] = []
         if spot is None:
             in_its_way = [self.placed[other] for other in self._taken.owners_at(wish.box)]
@@ -316,6 +318,10 @@ class _Taken:
         is_kept = [owner is not label for owner in self._owners]
         self._boxes = self._boxes[is_kept]
         self._owners = [owner for owner in self._owners if owner is not label]
+
+    def is_free(self, box: Box) -> bool:
+        """Return True where nothing of a box is taken."""
+        return not _overlaps(np.array([box]), self._boxes).any()
 
     def owners_at(self, box: Box) -> tuple[Label, ...]:
         """Return the labels that have taken some of a box, each once."""
