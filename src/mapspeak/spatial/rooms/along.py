@@ -142,10 +142,11 @@ def _distances_from_end(
     clear_m = known_clearance_m(floor)
     enough_m = min(END_RATIO * region.width_m, float(clear_m.max(initial=0.0)))
     candidates = floor.points_at(*np.nonzero(floor.free & (clear_m >= enough_m)))
-    one = _farthest(distances_from(floor, region.widest, radius_m=0.0), candidates)
+    from_middle = distances_from(floor, region.widest, radius_m=0.0)
+    one = _farthest(from_middle, candidates)
     if one is None:
         return None
-    distances = distances_from(floor, one, radius_m=0.0)
+    distances = from_middle.from_elsewhere(one)
     other = _farthest(distances, candidates) or one
     way = distances.way_to(other) or (one,)
     is_way = np.zeros(floor.cells.shape, dtype=np.bool_)
