@@ -134,7 +134,7 @@ def expected_area_m2(world: WorldModel) -> float:
 
 def known_area_m2(world: WorldModel) -> float:
     """Return the free floor on the map."""
-    return int(world.grid.free.sum()) * world.grid.resolution_m**2
+    return int(np.count_nonzero(world.grid.free)) * world.grid.resolution_m**2
 
 
 def find_unreachable(world: WorldModel) -> tuple[RefusedFrontier, ...]:

@@ -268,17 +268,17 @@ class _Search:
             if is_far and label not in self._far:
                 self._far[label] = self._field.positions((label,), FAR_RINGS)[0]
             positions = self._far[label] if is_far else self._near[label]
-            taken = self._taken.near(positions.boxes)
-            free = _cheapest_free(positions, np.flatnonzero(is_possible(positions)), taken)
+            possible = np.flatnonzero(is_possible(positions))
+            free = _cheapest_free(positions, possible, self._taken.boxes)
             if free.size:
-                cost, cheapest = self._judge(positions, free, taken)
+                cost, cheapest = self._judge(positions, free)
                 if cost < best_cost:
                     best, best_cost = positions.placed(cheapest), cost
             if best_cost < _FAIR_COST:
                 break
         return best
 
-    def _judge(self, positions: Positions, index: IntArray, taken: IntArray) -> tuple[float, int]:
+    def _judge(self, positions: Positions, index: IntArray) -> tuple[float, int]:
         """Return the lowest cost among positions, the other labels counted, and where it is."""
         label, boxes = positions.label, positions.boxes[index]
         cost, needs_leader = positions.cost[index], positions.needs_leader[index]
@@ -286,7 +286,7 @@ class _Search:
             cost += _COST_OF_HINDERING * _overlaps(boxes, self._spared).any(axis=1)
         if needs_leader.any():
             u, v = np.moveaxis(_leaders(label, boxes), 2, 0)[..., np.newaxis]
-            left, top, right, bottom = taken.T
+            left, top, right, bottom = self._taken.boxes.T
             is_crossing = (u >= left) & (u < right) & (v >= top) & (v < bottom)
             cost += _COST_OF_CROSSING * is_crossing.any(axis=2).mean(axis=1) * needs_leader
         best = int(np.argmin(cost))
@@ -297,7 +297,7 @@ class _Taken:
     """Boxes that no label may touch; grows as labels find their places."""
 
     def __init__(self, obstacles: tuple[Box, ...]) -> None:
-        self._boxes = np.array(obstacles, dtype=np.intp).reshape(-1, 4)
+        self.boxes = np.array(obstacles, dtype=np.intp).reshape(-1, 4)
         self._owners: list[Label | None] = [None] * len(obstacles)
 
     def add(self, spot: Placed) -> None:
@@ -310,32 +310,24 @@ class _Taken:
             shares = np.linspace(0.0, 1.0, 2 + int(length_px / _LEADER_STEP_PX))[:, np.newaxis]
             points = np.rint(leader[0] + (leader[1] - leader[0]) * shares).astype(np.intp)
             boxes = np.vstack([boxes, np.hstack([points, points])])
-        self._boxes = np.vstack([self._boxes, boxes + rim])
+        self.boxes = np.vstack([self.boxes, boxes + rim])
         self._owners += [spot.label] * len(boxes)
 
     def remove(self, label: Label) -> None:
         """Free a label's boxes."""
         is_kept = [owner is not label for owner in self._owners]
-        self._boxes = self._boxes[is_kept]
+        self.boxes = self.boxes[is_kept]
         self._owners = [owner for owner in self._owners if owner is not label]
 
     def is_free(self, box: Box) -> bool:
         """Return True where nothing of a box is taken."""
-        return not _overlaps(np.array([box]), self._boxes).any()
+        return not _overlaps(np.array([box]), self.boxes).any()
 
     def owners_at(self, box: Box) -> tuple[Label, ...]:
         """Return the labels that have taken some of a box, each once."""
-        found = np.flatnonzero(_overlaps(np.array([box]), self._boxes)[0])
+        found = np.flatnonzero(_overlaps(np.array([box]), self.boxes)[0])
         owners = [self._owners[index] for index in found]
         return tuple(dict.fromkeys(owner for owner in owners if owner is not None))
-
-    def near(self, boxes: IntArray) -> IntArray:
-        """Return those boxes that other boxes, or lines between these, may touch."""
-        if not len(boxes):
-            return self._boxes[:0]
-        first, last = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-        is_near = (self._boxes[:, :2] < last).all(axis=1) & (self._boxes[:, 2:] > first).all(axis=1)
-        return np.asarray(self._boxes[is_near])
 
 
 def _cheapest_free(positions: Positions, index: IntArray, taken: IntArray) -> IntArray:

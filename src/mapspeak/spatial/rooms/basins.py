@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms.floor import Floor
-from mapspeak.spatial.rooms.raster import Picture, find_cells
+from mapspeak.spatial.rooms.raster import Picture, find_cells, label_parts
 from mapspeak.spatial.visibility import cast_rays
 
 Heights = NDArray[np.float32]
@@ -67,9 +67,9 @@ def build_basins(heights: Heights, floor: Picture) -> Basins:
     ascent = np.take(steps, steepest.ravel(), mode="clip")
     ascent += np.arange(floor.size)
     peaks = floor & (steepest == 0)
-    _, peak_label = cv2.connectedComponents(peaks, connectivity=8)
+    _, peak_label = label_parts(peaks, connectivity=8)
     # Cells off the floor lead nowhere, and are no peaks.
-    labels = np.take(np.asarray(peak_label, np.int32), _follow(ascent)).reshape(floor.shape)
+    labels = np.take(peak_label, _follow(ascent)).reshape(floor.shape)
     found = np.flatnonzero(peaks.view(np.bool_))
     return Basins(heights=heights, labels=labels, ascent=ascent, peaks=found)
 

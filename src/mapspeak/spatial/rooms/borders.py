@@ -77,8 +77,8 @@ class PlaceGraph:
         self._cell_size_m = raster.cell_size_m
         self._sums = _sum_up(basins, raster, n)
         self._peak_m = np.zeros(n)
-        of_peak, height_m = (part.ravel()[basins.peaks] for part in (basins.labels, basins.heights))
-        np.maximum.at(self._peak_m, of_peak, height_m)
+        of_peak = basins.labels.ravel()[basins.peaks]
+        np.maximum.at(self._peak_m, of_peak, basins.heights.ravel()[basins.peaks])
         self._place_of = np.arange(n)
         self._borders = passes.values.copy()
         self.neighbours: list[dict[int, int]] = [{} for _ in range(n)]

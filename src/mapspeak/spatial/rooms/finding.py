@@ -89,8 +89,9 @@ def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionSh
         id="",
         index=index,
         room_class=RoomClass.ROOM,
-        free_area_m2=int((inside & (raster.free[window] > 0)).sum()) * raster.cell_area_m2,
-        floor_area_m2=int(inside.sum()) * raster.cell_area_m2,
+        free_area_m2=int(np.count_nonzero(inside & (raster.free[window] > 0)))
+        * raster.cell_area_m2,
+        floor_area_m2=int(np.count_nonzero(inside)) * raster.cell_area_m2,
         length_m=length * raster.cell_size_m,
         width_m=width * raster.cell_size_m,
         heading_rad=(heading - raster.turn_rad + raster.grid.origin.yaw_rad) % math.pi,

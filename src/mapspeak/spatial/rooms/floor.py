@@ -22,6 +22,8 @@ from mapspeak.spatial.rooms.raster import (
     drop_specks,
     find_boxes,
     find_cells,
+    label_parts,
+    widen,
 )
 
 
@@ -92,7 +94,7 @@ def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
 def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
     """Return the small unseen areas that border on floor more than on wall."""
     unseen = (1 - floor) & (1 - wall)
-    n, label = cv2.connectedComponents(unseen, connectivity=4)
+    n, label = label_parts(unseen, connectivity=4)
     small = np.bincount(label.ravel(), minlength=n) < largest
     small[0] = False
     border = np.zeros(n)
@@ -125,7 +127,7 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
     """
     size_m = raster.cell_size_m
     occupied = raster.occupied
-    thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
+    thick = widen(occupied, 1)
     large, slender = _sort_obstacles(raster.free, SETTINGS.island_size_m / size_m)
     side = max(round(SETTINGS.wall_thickness_m / size_m), 1)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
@@ -146,7 +148,7 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
     return wall, occupied & large
 
 
-def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
+def _open(picture: Picture, length: float, angle_deg: float) -> Picture:
     kernel = _line(length, angle_deg)
     # A line is nowhere that some cells of it are not; most directions match next to nothing.
     some = kernel * (np.cumsum(kernel).reshape(kernel.shape) % _SIEVE == 0)
@@ -155,7 +157,7 @@ def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Pictu
         core = cv2.erode(picture, kernel)
         return np.asarray(cv2.dilate(core, kernel), np.uint8)
     high, wide = (side // 2 for side in kernel.shape)
-    framed = cv2.copyMakeBorder(picture, high, high, wide, wide, cv2.BORDER_CONSTANT, value=1)
+    framed = np.pad(picture, ((high, high), (wide, wide)), constant_values=1)
     rows, cols = np.divmod(cells, picture.shape[1])
     middles = (rows + high) * framed.shape[1] + cols + wide
     steps = (np.nonzero(kernel)[0] - high) * framed.shape[1] + np.nonzero(kernel)[1] - wide
@@ -183,8 +185,8 @@ def _sort_obstacles(free: Picture, largest_island: float) -> tuple[Picture, Pict
     An island is an obstacle that can be driven around. A piece of wall is slender; a pillar, a
     chair and a box are not.
     """
-    solid = cv2.copyMakeBorder(1 - free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
-    n, label = cv2.connectedComponents(solid, connectivity=8)
+    solid = np.pad(1 - free, 1, constant_values=1)
+    n, label = label_parts(solid, connectivity=8)
     low, high = find_boxes(label, n)
     across = np.hypot(*(high - low))
     is_large = across >= largest_island

@@ -19,6 +19,7 @@ from mapspeak.spatial.rooms.raster import (
     find_fixed,
     is_near,
     is_short,
+    label_parts,
     line_along,
     open_box,
     run_lengths,
@@ -176,8 +177,7 @@ def _find_stubs(
 
 def _choose_blocks(piece: Picture, fixed: Picture, solid: Picture, cells: _Sizes) -> Picture:
     """Return the pieces that are furniture."""
-    n, label = cv2.connectedComponents(piece, connectivity=4)
-    numbers = np.asarray(label, np.int32)
+    n, numbers = label_parts(piece, connectivity=4)
     floor = 1 - solid
     # The cells in and beside each piece have its number.
     grown = cv2.dilate(numbers.astype(np.float32), np.ones((3, 3), np.uint8))
@@ -197,7 +197,7 @@ def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells:
     A piece with two of them divides them, as walls do.
     """
     near = widen(piece, cells.tip) & floor
-    _, stretch = cv2.connectedComponents(near, connectivity=4)
+    _, stretch = label_parts(near, connectivity=4)
     here = (near > 0) & (around > 0)
     pairs, counts = np.unique(stretch[here] * np.int64(n) + around[here], return_counts=True)
     least = max(cells.rim, 1)
@@ -215,7 +215,7 @@ def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:
 
 def _find_touching(crumbs: Picture, block: Picture) -> Picture:
     """Return the crumbs that touch a block."""
-    n, label = cv2.connectedComponents(crumbs, connectivity=8)
+    n, label = label_parts(crumbs, connectivity=8)
     touches = np.zeros(n, np.uint8)
     touches[label[widen(block, 1) > 0]] = 1
     touches[0] = 0

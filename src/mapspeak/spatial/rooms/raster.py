@@ -325,9 +325,15 @@ def run_lengths(solid: Picture, axis: int) -> tuple[NDArray[np.intp], NDArray[np
     return (row * lines.shape[1] + col)[ends], (stop - first)[ends]
 
 
-def find_boxes(label: Numbers, n: int) -> tuple[Places, Places]:
+def label_parts(picture: Picture, *, connectivity: int) -> tuple[int, NDArray[np.int32]]:
+    """Return the number of each cell's part, 0 where nothing is set, and how many numbers."""
+    n, label = cv2.connectedComponents(picture, connectivity=connectivity)
+    return n, np.asarray(label, np.int32)
+
+
+def find_boxes(label: NDArray[np.int32], n: int) -> tuple[Places, Places]:
     """Return where the box around each of n numbers begins and stops, (rows, columns) of (2, n)."""
-    framed = np.pad(label, ((0, 0), (1, 1)))
+    framed: NDArray[np.int32] = np.pad(label, ((0, 0), (1, 1)))
     rows, cols = find_cells(framed[:, 1:] != framed[:, :-1])
     low, high = np.full((2, n), max(label.shape)), np.zeros((2, n), np.intp)
     for number in (framed[rows, cols], framed[rows, cols + 1]):
@@ -339,7 +345,7 @@ def find_boxes(label: Numbers, n: int) -> tuple[Places, Places]:
 
 def drop_specks(free: Picture, least: float) -> Picture:
     """Return the floor without parts of fewer cells."""
-    n, label = cv2.connectedComponents(free, connectivity=4)
+    n, label = label_parts(free, connectivity=4)
     is_kept = np.bincount(label.ravel(), minlength=n) >= least
     is_kept[0] = False
     return np.take(is_kept.view(np.uint8), label)
@@ -347,8 +353,8 @@ def drop_specks(free: Picture, least: float) -> Picture:
 
 def drop_small(solid: Picture, least: float) -> Picture:
     """Return solid cells without smaller pieces that have floor all around."""
-    framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
-    n, label = cv2.connectedComponents(framed, connectivity=8)
+    framed = np.pad(solid, 1, constant_values=1)
+    n, label = label_parts(framed, connectivity=8)
     low, high = find_boxes(label, n)
     is_kept = np.hypot(*(high - low)) >= least
     is_kept[0] = False
@@ -357,6 +363,6 @@ def drop_small(solid: Picture, least: float) -> Picture:
 
 def find_fixed(solid: Picture) -> Picture:
     """Return the cells connected to the outside of the picture."""
-    framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
-    _, label = cv2.connectedComponents(framed, connectivity=8)
+    framed = np.pad(solid, 1, constant_values=1)
+    _, label = label_parts(framed, connectivity=8)
     return np.asarray(label[1:-1, 1:-1] == label[0, 0], np.uint8)
