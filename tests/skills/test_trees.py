@@ -171,12 +171,14 @@ def test_a_mission_within_a_mission_counts_as_often_as_it_is_run() -> None:
         ("{door.width}", 0.9),
         ("{n}", 3),
         ("door {door.answer}, {n} of {door.width}", "door open, 3 of 0.9"),
+        ("{door.share} of it", "0.999174 of it"),
+        ("{door.share}", 0.999174189814778),
         (["{n}", {"a": "{door}"}], [3, {"a": "open"}]),
         ("{ not a name }", "{ not a name }"),
     ],
 )
 def test_results_are_filled_in_by_name(wanted: JsonValue, filled: JsonValue) -> None:
-    values = {"door": {"answer": "open", "width": 0.9}, "n": 3}
+    values = {"door": {"answer": "open", "width": 0.9, "share": 0.999174189814778}, "n": 3}
     assert fill_in(wanted, values) == filled
 
 

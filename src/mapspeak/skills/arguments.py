@@ -113,11 +113,11 @@ def _is_within(parameter: SkillParameter, size: float) -> bool:
     return not (is_small or is_large)
 
 
-def plain(value: JsonValue) -> str:
+def plain(value: JsonValue, digits: str = ".15g") -> str:
     """Return a value as people write it: 3 for 3.0, true for True."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f"{value:.15g}" if isinstance(value, float) else str(value)
+    return f"{value:{digits}}" if isinstance(value, float) else str(value)
 
 
 def _number(parameter: SkillParameter, value: JsonValue) -> JsonValue | None:

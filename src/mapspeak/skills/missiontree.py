@@ -254,7 +254,7 @@ def fill_in(value: JsonValue, values: Arguments) -> JsonValue:
             whole = TEMPLATE.fullmatch(value)
             if whole is not None:
                 return _look_up(whole, values)
-            return TEMPLATE.sub(lambda match: plain(_look_up(match, values)), value)
+            return TEMPLATE.sub(lambda match: plain(_look_up(match, values), ".6g"), value)
         case Mapping():
             return {name: fill_in(each, values) for name, each in value.items()}
         case list() | tuple():
