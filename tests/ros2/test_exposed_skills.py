@@ -95,8 +95,25 @@ async def test_a_mission_uses_what_nodes_offer_and_what_the_owner_says_of_it(
   - check: {value: "{motors.message}", is: The motors are on.}
   - note: no power
 """
+    visit = """
+- fallback:
+  - timeout_s: 0.5
+    do:
+    - navigate_to_pose: {pose_header_frame_id: map, pose_pose_position_x: "{x}"}
+  - switch_motors: true
+"""
+    offered = {"switch_motors", "navigate_to_pose", "spin"}
     async with exposed(link, robot, tmp_path) as caller:
-        await caller.until(lambda tools: "switch_motors" in tools)
+        await caller.until(lambda tools: offered <= tools.keys())
         told = await caller.ask("run_mission", tree=tree, wait_s=20)
+        await caller.ask("save_mission", name="visit", tree=visit, parameters=["x"])
+        late = await caller.ask("run_mission", name="visit", values=["x=8"], wait_s=20)
+        begun = await caller.ask("run_mission", tree="- spin: {target_yaw: 60}\n", wait_s=0)
+        ended = await caller.ask("cancel_skill", run="S3")
+        assert not robot.is_driving
     assert "succeeded after" in told
     assert "no power" not in told
+    assert "navigate_to_pose: cut off" in late
+    assert "succeeded after" in late
+    assert "running" in begun
+    assert "cancelled" in ended
