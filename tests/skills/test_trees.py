@@ -56,10 +56,10 @@ def check(tree: str, *parameters: str, more: dict[str, Skill] | None = None) -> 
 
     def find(name: str) -> Skill:
         if name not in known:
-            raise SkillError(f"There is no skill {name!r}.", hint="")
+            raise SkillError(f"There is no skill {name!r}.", hint="Did you mean another?")
         return known[name]
 
-    return MissionChecker(find, lambda: known).check(mission(tree, *parameters))
+    return MissionChecker(find).check(mission(tree, *parameters))
 
 
 def test_a_list_is_a_sequence_and_a_word_a_skill_that_is_given_nothing() -> None:
@@ -116,7 +116,7 @@ def test_aliases_that_multiply_are_counted_as_often_as_they_are_done() -> None:
 @pytest.mark.parametrize(
     ("written", "fault"),
     [
-        ("- dirve: R1", "There is no skill 'dirve'. Did you mean drive?"),
+        ("- dirve: R1", "Step 2: There is no skill 'dirve'. Did you mean another?"),
         ("- drive: '{door.room}'", "Step 2 (drive) uses {door}, which no step before gives"),
         ("- speak: '{b}'\n- check: {}\n  as: b", "uses {b}"),
         ("- speak: hello\n  volume: 3", "takes no 'volume'"),

@@ -1,8 +1,7 @@
 """A mission as a tree of steps: its largest cost, and a check that all its skills are known."""
 
-import difflib
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -150,11 +149,9 @@ class MissionChecker:
 
     Attributes:
         find_skill: Raises `SkillError` for a name that it does not know.
-        list_skills: Names all skills, for a hint at a misspelled one.
     """
 
     find_skill: FindSkill
-    list_skills: Callable[[], Iterable[str]]
 
     def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
         """Return what a mission can do at most.
@@ -194,10 +191,7 @@ class MissionChecker:
         try:
             skill = self.find_skill(step.skill)
         except SkillError as error:
-            known = list(self.list_skills())
-            near = difflib.get_close_matches(step.skill, known, n=1)
-            hint = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(known)}."
-            raise SkillError(f"Step {step.number}: {error.message}", hint=hint) from error
+            raise SkillError(f"Step {step.number}: {error.message}", hint=error.hint) from error
         spec, what = skill.spec, f"Step {step.number} ({step.skill})"
         given = step.name_arguments(spec)
         for name in sorted(find_names(given) - names):

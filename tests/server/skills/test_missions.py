@@ -389,6 +389,7 @@ async def test_a_skill_with_a_mistake_in_it_ends_the_mission_and_nothing_drives_
         ("sequence: [" + "look, " * 400 + "look]", "more than 300 steps"),
         ("", "needs a list of steps"),
         ("- fly: away", "There is no skill 'fly'"),
+        ("- dirve: R1", "There is no skill 'dirve'. Did you mean drive?"),
         ("- drive: '{door.room}'", "which no step before gives"),
         ("- wait: {duration_s: [1, 2]}", "duration_s cannot be"),
     ],

@@ -1,5 +1,6 @@
 """All skills of one server by their names: built in, the robot's own, its owner's, missions."""
 
+import difflib
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -55,7 +56,7 @@ class SkillBook:
             logger.warning("The mission %s was interrupted: its server ended.", each.name)
         facts = SessionFacts(session, ros)
         self._gate = SkillGate(facts, session.guard)
-        checker = MissionChecker(self.find, lambda: sorted(self.skills))
+        checker = MissionChecker(self.find)
         self.desk = MissionDesk(checker, self._gate, record, present=session.client_is_heard)
         leaves = Leaves(session, facts, self.questions).list_skills()
         self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
@@ -85,9 +86,9 @@ class SkillBook:
         """
         found = self.skills.get(name)
         if found is None:
-            raise SkillError(
-                f"There is no skill {name[:60]!r}.", hint=f"There are: {', '.join(self.skills)}."
-            )
+            near = difflib.get_close_matches(name, self.skills, n=1)
+            hint = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(self.skills)}."
+            raise SkillError(f"There is no skill {name[:60]!r}.", hint=hint)
         return found
 
     def put_up(self, board: SkillBoard) -> None:
