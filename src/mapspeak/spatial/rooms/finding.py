@@ -25,12 +25,13 @@ from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
 STRIP = 3.0
 """Elongation from which a region is a strip: something to walk along, not a room."""
-CORRIDOR_LADDER = ((2 * STRIP, 0), (2.5, 3), (2.0, 4), (1.5, 5), (1.0, 6))
-"""Elongation above which a region is a corridor, by the least number of its neighbours.
+BEND = 2 * STRIP
+"""Elongation from which a region is a strip on both sides of a bend.
 
-An L-shaped room is as elongated as a strip, and leads to one or two others. A region with no more
-exits is a corridor only if it is a strip, straight (`Shape.is_strip`) or on both sides of a bend.
+What parts several regions from each other is a corridor with as much for all of them together.
 """
+MANY_NEIGHBOURS = 3
+"""An L-shaped room is as elongated as a strip, and leads to one or two others."""
 ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""
 HALL_WIDTH_M = 10.0
@@ -145,20 +146,18 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
     return one + 1, other + 1, math.radians(angle_deg)
 
 
-def classify(shape: RegionShape, *, n_neighbours: int, exits_m: Sequence[float]) -> RoomClass:
+def classify(shape: RegionShape, *, n_parted: int, exits_m: Sequence[float]) -> RoomClass:
     """Return the class of a region.
 
     Args:
+        n_parted: How many neighbours it has, if it parts them; else 0.
         exits_m: The widths of the ways out of it.
     """
-    # Closets and stairs are strips behind one door that is narrower than they are.
-    is_closet = len(exits_m) == 1 and exits_m[0] < RUN_ON_RATIO * walked_size(shape)[1]
-    is_way = shape.is_strip and (shape.is_half_seen or not is_closet)
-    leads_on = is_way or any(
-        shape.elongation > elongation and n_neighbours >= least
-        for elongation, least in CORRIDOR_LADDER
-    )
     _, width_m = walked_size(shape)
+    # Closets and stairs are strips behind one door that is narrower than they are.
+    is_closet = len(exits_m) == 1 and exits_m[0] < RUN_ON_RATIO * width_m
+    is_way = shape.is_strip and (shape.is_half_seen or not is_closet)
+    leads_on = is_way or max(n_parted, 1) * shape.elongation > BEND
     if leads_on and width_m < HALL_WIDTH_M:
         return RoomClass.CORRIDOR
     is_wide = leads_on or 2 * shape.region.clearance_m >= OPEN_SPACE_WIDTH_M
@@ -314,12 +313,28 @@ def classify_all(shapes: list[RegionShape], openings: list[Opening]) -> list[Roo
     exits_m: list[list[float]] = [[] for _ in shapes]
     for opening in openings:
         for one, other in permutations((opening.first - 1, opening.second - 1)):
-            behind[one].add(other + 1)
+            behind[one].add(other)
             exits_m[one].append(opening.width_m)
     return [
-        classify(shape, n_neighbours=len(others), exits_m=widths_m)
-        for shape, others, widths_m in zip(shapes, behind, exits_m, strict=True)
+        classify(
+            shape,
+            n_parted=len(behind[number]) if _is_only_way(behind, number) else 0,
+            exits_m=exits_m[number],
+        )
+        for number, shape in enumerate(shapes)
     ]
+
+
+def _is_only_way(behind: Sequence[set[int]], number: int) -> bool:
+    """Return True if some neighbours of a region are reached from others only through it."""
+    if len(behind[number]) < MANY_NEIGHBOURS:
+        return False
+    reached, waiting = {number}, [min(behind[number])]
+    while waiting and not behind[number] <= reached:
+        here = waiting.pop()
+        reached.add(here)
+        waiting += behind[here] - reached
+    return not behind[number] <= reached
 
 
 def _name(
