@@ -99,6 +99,32 @@ AROUND_A_CORNER = """
                                      #######
 """
 
+PASSAGE = """
+    #########################################
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    #.............#.............#...........#
+    ######...##########...#######...........#
+    #...........................#...........#
+    #...........................#...........#
+    #...........................#...........#
+    #.......................................#
+    #.......................................#
+    #.......................................#
+    #...........................#...........#
+    #...........................#...........#
+    #...........................#...........#
+    #...........................#...........#
+    #...........................#...........#
+    #########################################
+"""
+
 
 def divided(text: str) -> RoomMap:
     return find_rooms(grid_from_text(text, resolution_m=CELL_M))
@@ -131,3 +157,20 @@ def test_a_slit_that_no_robot_can_stand_in_is_no_region() -> None:
     regions = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05)).regions
 
     assert [region.id for region in regions] == ["R1"]
+
+
+def test_what_alone_leads_from_one_room_to_another_is_a_corridor() -> None:
+    rooms = divided(PASSAGE)
+
+    assert sorted(region.room_class for region in rooms.regions) == [
+        RoomClass.CORRIDOR,
+        *[RoomClass.ROOM] * 3,
+    ]
+
+
+def test_a_room_beside_others_that_lead_to_each_other_is_no_corridor() -> None:
+    rows = PASSAGE.splitlines()
+    for row in (5, 6, 7):
+        rows[row] = "    #.......................................#"
+
+    assert {region.room_class for region in divided("\n".join(rows)).regions} == {RoomClass.ROOM}
