@@ -37,6 +37,9 @@ _FILLED_RATIO = 0.7
 _WHOLE_RATIO = 0.85
 """Obstacles at a wall longer than this share of the limit may go on: they are not blocks."""
 
+_STUB_M = 0.3
+"""The shortest piece of wall, ending at a block, that runs on behind it."""
+
 Counts = NDArray[np.intp]
 Numbers = NDArray[np.int32]
 
@@ -73,7 +76,7 @@ class _Sizes:
         )
         self.thin = max(round(SETTINGS.block_depth_m / cell_size_m) + 2, round(wall)) | 1
         self.long = round(SETTINGS.block_length_m / cell_size_m)
-        self.stub = round(SETTINGS.stub_m / cell_size_m) | 1
+        self.stub = round(_STUB_M / cell_size_m) | 1
         self.tip = round(SETTINGS.tip_m / cell_size_m)
         self.rim = round(_RIM_M / cell_size_m)
         self.crumb = _CRUMB_M / cell_size_m

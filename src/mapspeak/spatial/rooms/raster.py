@@ -61,7 +61,7 @@ class RoomSettings:
     smoothing_m: float = 0.1
     door_width_m: float = 3.5
     leaf_width_m: float = 1.0
-    stub_m: float = 0.3
+    stub_m: float = 0.5
     tip_m: float = 0.25
     join_share: float = 0.45
     room_area_m2: float = 1.5
