@@ -15,8 +15,10 @@ import pytest
 from click.testing import CliRunner
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters, stdio_client
+from rosbags.highlevel import AnyReader
 
 from fakes import FakeRobot, two_rooms
+from livepage import find_free_address
 from mapspeak.cli import cli
 from mapspeak.cli.memory.choosing import rename_memory
 from mapspeak.geometry import Pose
@@ -208,6 +210,25 @@ async def test_over_http_it_says_where_it_answers_once_it_does(tmp_path: Path) -
     assert "/mcp" in where
     assert "/health" in where
     assert not memories_in(tmp_path)
+
+
+@pytest.mark.anyio
+async def test_a_recording_is_whole_when_a_signal_ends_the_server(tmp_path: Path) -> None:
+    address, path = find_free_address(), tmp_path / "run.mcap"
+    command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"]
+    options = ["--http", address, "--record", str(path)]
+    with anyio.fail_after(PATIENCE_S):
+        async with await anyio.open_process(
+            [*command, *options], env=environment(tmp_path)
+        ) as process:
+            assert process.stderr is not None
+            await process.stderr.receive()
+            async with Client(f"http://{address}/mcp") as client:
+                await client.call_tool("get_robot_pose", {})
+            process.terminate()
+            await process.wait()
+    with AnyReader([path]) as reader:
+        assert "/mapspeak/calls" in {each.topic for each in reader.connections}
 
 
 async def ask_for(port: int, path: str) -> str:

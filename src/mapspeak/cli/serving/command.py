@@ -4,12 +4,11 @@ import gc
 import logging
 import math
 import os
-import shutil
 import signal
 import sys
 import threading
 from collections.abc import Callable, Collection, Coroutine, Generator, Mapping, Sequence
-from contextlib import AsyncExitStack, contextmanager
+from contextlib import AsyncExitStack, ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -202,13 +201,14 @@ def end_at_once() -> None:
 
 async def _serve(options: ServeOptions) -> None:
     async with AsyncExitStack() as links:
-        scratch = Path(links.enter_context(TemporaryDirectory(prefix="mapspeak-")))
+        files = links.enter_context(ExitStack())
+        scratch = TemporaryDirectory(prefix="mapspeak-", ignore_cleanup_errors=True)
         with _loading():
             from mapspeak.server.transport import serve_http, serve_stdio  # noqa: PLC0415
 
-            served = await _open_all(options, links, scratch)
+            served = await _open_all(options, links, files, Path(files.enter_context(scratch)))
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(_end_on_signal, served.sessions, scratch)
+            tasks.start_soon(_end_on_signal, served.sessions, files)
             for work in served.work:
                 tasks.start_soon(work)
             try:
@@ -251,7 +251,9 @@ class _Served:
     work: Sequence[Callable[[], Coroutine[Any, Any, None]]]
 
 
-async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path) -> _Served:
+async def _open_all(
+    options: ServeOptions, links: AsyncExitStack, files: ExitStack, scratch: Path
+) -> _Served:
     """Open every robot, and build its server and what draws it."""
     from mapspeak.server.fleet import FleetServer  # noqa: PLC0415
     from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415
@@ -271,7 +273,7 @@ async def _open_all(options: ServeOptions, links: AsyncExitStack, scratch: Path)
     drawers, notes = open_drawing(
         opened,
         calls,
-        links,
+        files,
         has_markers=options.has_markers,
         record=options.record,
         foxglove=options.foxglove,
@@ -339,11 +341,11 @@ def _build_server(
     )
 
 
-async def _end_on_signal(sessions: "Collection[Session]", scratch: Path) -> None:
+async def _end_on_signal(sessions: "Collection[Session]", files: ExitStack) -> None:
     with anyio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async for number in signals:
             await _close_all(sessions)
-            shutil.rmtree(scratch, ignore_errors=True)
+            files.close()
             # A thread may wait for standard input for ever; there is nothing left to wait for.
             os._exit(128 + number)
 

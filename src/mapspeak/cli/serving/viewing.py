@@ -1,7 +1,7 @@
 """`mapspeak view`, and what shows served robots: the live page, RViz, Foxglove, a file."""
 
 from collections.abc import Callable, Coroutine, Mapping
-from contextlib import AsyncExitStack
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -299,7 +299,7 @@ DRAWING_OPTIONS = (
 def open_drawing(
     opened: "Mapping[str, tuple[Session, RosConnection | None]]",
     notes: "Mapping[str, CallNoting | None]",
-    links: AsyncExitStack,
+    files: ExitStack,
     *,
     has_markers: bool,
     record: Path | None,
@@ -310,7 +310,7 @@ def open_drawing(
     Args:
         opened: The session and the ROS of each robot, by its name.
         notes: Where the calls of each are noted without a drawing.
-        links: Closes what is opened.
+        files: Closes what is opened.
         has_markers: Publish markers on the robot's ROS.
         record: A file (MCAP) to record to.
         foxglove: An address of this machine at which Foxglove is served.
@@ -330,7 +330,7 @@ def open_drawing(
                     "and --record show the simulated robot without ROS.",
                 )
             drawers.append(MarkerPublisher(session, ros, name=name).run)
-    recorders = _open_recorders(record, foxglove, links)
+    recorders = _open_recorders(record, foxglove, files)
     if not recorders:
         return drawers, dict(notes)
     from mapspeak.server.view.calls import CallFeed  # noqa: PLC0415 - heavy
@@ -343,7 +343,7 @@ def open_drawing(
 
 
 def _open_recorders(
-    record: Path | None, foxglove: str | None, links: AsyncExitStack
+    record: Path | None, foxglove: str | None, files: ExitStack
 ) -> "list[Recorder]":
     if record is None and foxglove is None:
         return []
@@ -357,7 +357,7 @@ def _open_recorders(
 
     recorders = []
     if record is not None:
-        recorders.append(links.enter_context(record_to(record)))
+        recorders.append(files.enter_context(record_to(record)))
     if foxglove is not None:
         host, port = parse_address(foxglove)
         if not is_loopback(host):
@@ -365,6 +365,6 @@ def _open_recorders(
                 f"{host} can be reached from other machines, and Foxglove asks for no password.",
                 hint="Serve it on 127.0.0.1, and reach it through an SSH tunnel.",
             )
-        recorders.append(links.enter_context(serve_foxglove(host, port)))
+        recorders.append(files.enter_context(serve_foxglove(host, port)))
         click.echo(f"mapspeak: for Foxglove at ws://{foxglove}", err=True)
     return recorders
