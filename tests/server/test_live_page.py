@@ -556,10 +556,11 @@ async def test_a_token_is_too_long_to_guess_and_is_typed_with_or_without_dashes(
     assert answer.status_code == 200
 
 
-async def test_the_answer_to_a_wrong_token_is_slow() -> None:
+@pytest.mark.parametrize("token", ["wrong", "\ud800"])
+async def test_the_answer_to_a_wrong_token_is_slow(token: str) -> None:
     keys = PageKeys(lambda _: None, wrong_s=3600.0)
     with anyio.move_on_after(0.05) as waiting:
-        await keys.unlock("wrong")
+        await keys.unlock(token)
     assert waiting.cancelled_caught
 
 
@@ -616,7 +617,7 @@ async def test_a_body_that_is_no_command_is_refused(tmp_path: Path, body: bytes)
     assert answer.status_code in (400, 413)
 
 
-@pytest.mark.parametrize("x", ["here", None, 1e300])
+@pytest.mark.parametrize("x", ["here", None, 1e300, True])
 async def test_a_place_that_is_no_place_is_refused(tmp_path: Path, x: object) -> None:
     async with serve_live(tmp_path) as live:
         await live.unlock()

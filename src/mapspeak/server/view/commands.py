@@ -27,7 +27,7 @@ Words = Annotated[str, Field(min_length=1, max_length=120)]
 class CommandBody(BaseModel):
     """The arguments of a command."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Nothing(CommandBody):

@@ -46,8 +46,9 @@ class PageKeys:
 
     async def unlock(self, token: str, name: str = "") -> str | None:
         """Return a key for the token, which is used up then; None for a wrong one."""
-        typed = token.strip().lower().replace("-", "")
-        if not secrets.compare_digest(typed.encode(), self._token.encode()):
+        # Half a letter of UTF-16, which JSON can carry, is in no token.
+        typed = token.strip().lower().replace("-", "").encode(errors="replace")
+        if not secrets.compare_digest(typed, self._token.encode()):
             await anyio.sleep(self._wrong_s)
             return None
         key = secrets.token_urlsafe(24)
