@@ -1,6 +1,5 @@
 """What lies on the map in RViz and Foxglove: markers on the robot's ROS, and what is recorded."""
 
-import json
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -166,12 +165,3 @@ def test_the_layouts_for_rviz_show_what_is_published(name: str) -> None:
     assert shown.get("Marker Topic", latched.get("Value")) == topic_for("")
     assert latched.get("Durability Policy", "Transient Local") == "Transient Local"
     assert set(shown["Namespaces"]) == {each["ns"] for each in drawn()[1:]}
-
-
-def test_the_layout_for_foxglove_shows_what_is_recorded() -> None:
-    layout = json.loads((LAYOUTS / "mapspeak-foxglove.json").read_text(encoding="utf-8"))
-    configs = layout["configById"]
-    assert set(configs["3D!map"]["topics"]) == {"/map", "/pose", topic_for("")}
-    assert configs["Image!camera"]["imageMode"]["imageTopic"] == "/camera/compressed"
-    logs = {configs[panel]["topicToRender"] for panel in ("RosOut!calls", "RosOut!audit")}
-    assert logs == {"/mapspeak/calls", "/mapspeak/audit"}

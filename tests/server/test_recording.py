@@ -40,6 +40,7 @@ TOPICS = {
     "/mapspeak/calls": "rcl_interfaces/msg/Log",
     "/mapspeak/audit": "rcl_interfaces/msg/Log",
 }
+LAYOUT = Path(__file__).parents[2] / "docs" / "layouts" / "mapspeak-foxglove.json"
 
 
 class Noting(Recorder):
@@ -109,6 +110,25 @@ async def test_a_recording_holds_all_of_it_for_other_programs(tmp_path: Path) ->
     assert lost.level == 30
     decisions = [json.loads(each.msg) for each in messages["/mapspeak/audit"]]
     assert {each["event"] for each in decisions} >= {"decision"}
+
+
+def test_every_panel_of_the_layout_for_foxglove_shows_a_topic_of_its_kind() -> None:
+    layout = json.loads(LAYOUT.read_text(encoding="utf-8"))
+    shown = {
+        panel: [
+            *config.get("topics", ()),
+            *filter(
+                None, [config.get("topicToRender"), config.get("imageMode", {}).get("imageTopic")]
+            ),
+        ]
+        for panel, config in layout["configById"].items()
+    }
+    assert {panel: [TOPICS[topic] for topic in topics] for panel, topics in shown.items()} == {
+        "3D!map": [TOPICS["/map"], TOPICS["/mapspeak/markers"], TOPICS["/pose"]],
+        "Image!camera": ["sensor_msgs/msg/CompressedImage"],
+        "RosOut!calls": ["rcl_interfaces/msg/Log"],
+        "RosOut!audit": ["rcl_interfaces/msg/Log"],
+    }
 
 
 async def test_of_several_robots_each_has_topics_of_its_own(tmp_path: Path) -> None:
