@@ -30,6 +30,7 @@ MOST_TESTS = 60
 TIMEOUT_S = 300.0
 TESTS_FAILED = 1
 """The exit code of pytest for that."""
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 BOUNDS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
@@ -89,16 +90,16 @@ def find_faults(path: Path) -> Iterator[Fault]:
     def find_place(line: int, column: int) -> int:
         return offsets[line - 1] + len(lines[line - 1].encode()[:column].decode())
 
-    for function in ast.walk(ast.parse(source)):
-        if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
-            continue
-        for statement in function.body:
-            for node in ast.walk(statement):
-                for kind, made in _spoil(node):
-                    ends = (node.end_lineno, node.end_col_offset)  # type: ignore[attr-defined]
-                    span = (find_place(node.lineno, node.col_offset), find_place(*ends))  # type: ignore[attr-defined]
-                    now = source[slice(*span)]
-                    yield Fault(path, node.lineno, kind, span, now, made)  # type: ignore[attr-defined]
+    tree = ast.parse(source)
+    functions = (each for each in ast.walk(tree) if isinstance(each, FUNCTIONS))
+    # The faults of a nested function are also those of the one around it.
+    nodes = (node for each in functions for part in each.body for node in ast.walk(part))
+    for node in dict.fromkeys(nodes):
+        for kind, made in _spoil(node):
+            ends = (node.end_lineno, node.end_col_offset)  # type: ignore[attr-defined]
+            span = (find_place(node.lineno, node.col_offset), find_place(*ends))  # type: ignore[attr-defined]
+            now = source[slice(*span)]
+            yield Fault(path, node.lineno, kind, span, now, made)  # type: ignore[attr-defined]
 
 
 def _spoil(node: ast.AST) -> Iterator[tuple[str, str]]:

@@ -20,6 +20,7 @@ INLINE_COMMAND = re.compile(r"(?<!`)`((?:\./run|mapspeak) [^`\n]+)`(?!`)")
 LINK = re.compile(r"\]\(([^)\s#]+)[^)]*\)")
 LINK_TO_HEADING = re.compile(r"\]\(([^)\s#:]*)#([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.+)$", re.MULTILINE)
+PLACE_IN_TREE = re.compile(r"`([a-z_0-9]+(?:/[a-z_0-9]+)+/?|[a-z_0-9]+(?:/|\.py))`")
 END_OF_COMMAND = {"|", "||", "&&", "&", ";", ">", "<", "2>"}
 
 
@@ -151,3 +152,15 @@ def test_links_to_headings_lead_somewhere() -> None:
     ]
 
     assert not dead
+
+
+def test_what_contributing_says_of_the_tree_is_there() -> None:
+    guide = (CHECKOUT / "CONTRIBUTING.md").read_text()
+    tree = guide[guide.index("## The tree") : guide.index("## How we write")]
+    places = {place.rstrip("/") for place in PLACE_IN_TREE.findall(tree)}
+    homes = (CHECKOUT, CHECKOUT / "src/mapspeak", CHECKOUT / "src/mapspeak/server")
+    assert [
+        place
+        for place in sorted(places)
+        if not any((home / place).exists() or (home / f"{place}.py").exists() for home in homes)
+    ] == []

@@ -15,7 +15,8 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
-from mapspeak.server.transport import HangUpWatch, TokenGuard, serve_http
+from mapspeak.server.transport import HangUpWatch, serve_http
+from mapspeak.server.wire.access import TokenGuard
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio

@@ -18,6 +18,12 @@ async def drive(speed, turn):
     if speed < 1 and not turn:
         await stop()
     return math.radians(turn) - reach
+
+
+def outer():
+    def inner(speed):
+        return -speed
+    return inner
 '''
 
 
@@ -40,6 +46,7 @@ def test_each_kind_of_fault_is_found_once_where_it_stands(found: list[Fault]) ->
         (10, "dropped await", "await stop()", "pass"),
         (11, "sign or factor", "math.radians(turn) - reach", "(math.radians(turn) + reach)"),
         (11, "unit", "math.radians(turn)", "(turn)"),
+        (16, "sign", "-speed", "(speed)"),
     ]
 
 

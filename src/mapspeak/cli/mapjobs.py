@@ -15,10 +15,9 @@ from PIL import Image, UnidentifiedImageError
 from mapspeak.errors import ConfigError, say_cause
 from mapspeak.geometry import Point
 from mapspeak.spatial.areagraph import MapAnchor
-from mapspeak.spatial.mapfiles import find_picture
+from mapspeak.spatial.mapfiles import PICTURE_SUFFIXES, find_picture
 
 DESCRIPTION_SUFFIXES = {".yaml", ".yml"}
-PICTURE_SUFFIXES = {".png", ".pgm", ".bmp", ".jpg", ".jpeg"}
 
 _LONGEST_DESCRIPTION = 65536
 _PATTERN_SIGN = re.compile(r"[*?[]")

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import anyio
 
-from mapspeak.driving.drivemonitor import NEEDS_NO_STOP, DriveMonitor, Look, OwedStop
+from mapspeak.driving.drivemonitor import NEEDS_NO_STOP, PATIENCE_S, DriveMonitor, Look, OwedStop
 from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_failed
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
@@ -45,7 +45,7 @@ class DriveBook:
         robot: Robot,
         *,
         when_busy: WhenBusy = WhenBusy.REPLACE,
-        patience_s: float = 60.0,
+        patience_s: float = PATIENCE_S,
         wall_s: Callable[[], float] = anyio.current_time,
     ) -> None:
         self._robot = robot

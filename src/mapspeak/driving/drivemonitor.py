@@ -13,6 +13,8 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
 from mapspeak.safety import NOBODY, calling
 
+PATIENCE_S = 60.0
+"""Robot time without any movement after which a drive has timed out."""
 MOVED_M = 0.1
 TURNED_RAD = math.radians(10)
 JUMP_M = 1.0

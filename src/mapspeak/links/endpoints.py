@@ -10,6 +10,14 @@ from mapspeak.ros.port import EndQuality
 
 SERVICE_PART = re.compile(r"_(?:Request|Response)$")
 ACTION_PART = re.compile(r"_(?:SendGoal|GetResult)$|_FeedbackMessage$")
+FIRST_SIGN_S = 5.0
+"""For the first node of others to be found before we begin without.
+
+A call that is lost on a busy machine comes again after three seconds: so Fast DDS has it.
+"""
+LONGEST_LOOK_S = 3.0
+ARRIVAL_S = 0.5
+"""Wait for the last publications to arrive before leaving."""
 
 
 def full_type(name: str) -> str:

@@ -11,6 +11,7 @@ from mapspeak.memory.things.approach import OVERLOOK_M, find_overlook
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
+from mapspeak.spatial.frontiers.viewpoints import NARROW_COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.worldmodel.model import WorldModel, find_crossing
@@ -19,8 +20,6 @@ from mapspeak.worldmodel.revision import MapRevision
 
 EVERY_M = 1.0
 """Places to look from are this far from each other."""
-NARROW_COMFORT_M = 0.1
-"""What it should have at least where many places are compared."""
 OWN_M = 0.6
 """So near to a thing nothing hides it but itself, or the wall that it hangs on."""
 COMFORT_M = 0.15

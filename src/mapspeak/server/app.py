@@ -1,7 +1,6 @@
 """The MCP server around a session: chosen tools, readable errors, lean schemas."""
 
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -20,17 +19,15 @@ from mcp_types import (
     PaginatedRequestParams,
 )
 from mcp_types import Tool as ListedTool
-from pydantic import ValidationError
 
 from mapspeak import __version__
-from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.remarks import Remarks, shorten_report, show_controls_of
 from mapspeak.server.reports.representations import Representation
-from mapspeak.server.text.offered import offering, say_error, write_instructions
+from mapspeak.server.text.offered import DISAGREED, explain, offering, write_instructions
 from mapspeak.server.text.wording import show_controls
-from mapspeak.server.tools.asking import Asking, client_of
+from mapspeak.server.tools.caller import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.book import SkillBook
@@ -51,9 +48,6 @@ from mapspeak.skills.skillsfile import OwnersEntry
 
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
-ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
-"""A name of an argument, or the number of an item; pydantic names the tried types among them."""
-INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
 MOST_BYTES = 1_000_000
 """Of the arguments of one call, written as JSON; no model writes a hundredth of that."""
 
@@ -143,7 +137,7 @@ class MapspeakServer(MCPServer[Any]):
             try:
                 answer = await self._call_with_approval(name, arguments, context)
             except ToolError as error:
-                readable = _explain(name, error.__cause__)
+                readable = explain(name, error.__cause__)
                 if readable is None:
                     raise
                 renamed = await self._remarks.say_renamed(arguments)
@@ -173,7 +167,7 @@ class MapspeakServer(MCPServer[Any]):
             return await self._run(name, arguments, context)
         asking = Asking(context, approval=guard.policy.approval, client=name_client(context))
         if not asking.take_answers(guard.approvals):
-            raise _disagreed()
+            raise ToolError(DISAGREED)
         try:
             return await self._run(name, arguments, context)
         except ToolError as error:
@@ -184,7 +178,7 @@ class MapspeakServer(MCPServer[Any]):
             if question is not None:
                 return question
             if not await asking.ask_at_once(needed, guard.approvals):
-                raise _disagreed() from error
+                raise ToolError(DISAGREED) from error
         return await self._run(name, arguments, context)
 
     async def _run(
@@ -357,27 +351,3 @@ def _count_stops(session: Session) -> int:
     """Return a number that changes when the robot is stopped or held."""
     is_held = session.guard is not None and session.guard.hold.read() is not None
     return 2 * session.drives.n_stops + is_held
-
-
-def _disagreed() -> ToolError:
-    return ToolError(
-        "The person who was asked did not agree. Do not ask again; tell them what you need it for."
-    )
-
-
-def _explain(name: str, cause: BaseException | None) -> str | None:
-    match cause:
-        case MapspeakError():
-            return say_error(cause)
-        case ValidationError():
-            faults = [_fault(error["loc"], error["msg"]) for error in cause.errors()]
-            return f"{name} was called with wrong arguments: {'; '.join(dict.fromkeys(faults))}."
-        case _:
-            return None
-
-
-def _fault(location: tuple[int | str, ...], message: str) -> str:
-    """Say where something is wrong, by the names that the caller gave and no class of ours."""
-    named = [str(part) for part in location if ARGUMENT.fullmatch(str(part))]
-    said = INSTANCE.sub("an object", message)
-    return f"{'.'.join(named) or 'arguments'}: {said[:1].lower()}{said[1:]}"

@@ -1,7 +1,6 @@
 """How a server reaches its clients: stdio, or streaming HTTP with its doors closed by default."""
 
 import logging
-import secrets
 from collections.abc import AsyncIterable, Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
@@ -24,13 +23,13 @@ from mapspeak.server.wire.access import (
     HEALTH,
     HostGuard,
     ReadyServer,
+    TokenGuard,
     find_security,
     is_loopback,
     listen,
     parse_address,
 )
 
-PUBLIC = ("/", HEALTH)
 HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 
 
@@ -155,31 +154,6 @@ class HangUpWatch:
         await self._app(scope, watch_receive, watch_send)
         if is_ended:
             await self._on_hang_up(client)
-
-
-class TokenGuard:
-    """Lets only requests through that carry the bearer token."""
-
-    def __init__(self, app: ASGIApp, token: str) -> None:
-        self._app = app
-        self._token = token.encode()
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on, or answer 401."""
-        if scope["type"] == "http" and not self._is_welcome(scope):
-            refusal = PlainTextResponse(
-                "A bearer token is needed.", 401, headers={"WWW-Authenticate": "Bearer"}
-            )
-            await refusal(scope, receive, send)
-            return
-        await self._app(scope, receive, send)
-
-    def _is_welcome(self, scope: Scope) -> bool:
-        # The scheme's name is written in any case (RFC 9110, section 11.1).
-        scheme, _, given = dict(scope["headers"]).get(b"authorization", b"").partition(b" ")
-        is_bearer = scheme.lower() == b"bearer"
-        is_right = secrets.compare_digest(given.strip(), self._token)
-        return scope["path"] in PUBLIC or (is_bearer and is_right)
 
 
 async def _say_ok(_request: object) -> PlainTextResponse:

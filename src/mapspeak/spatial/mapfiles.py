@@ -35,7 +35,7 @@ _MAX_YAML_BYTES, _MOST_NESTED = 1_000_000, 20
 _FREE, _OCCUPIED = 0, 100
 UNKNOWN_GREY = 205
 DEFAULT_OCCUPIED_THRESH, DEFAULT_FREE_THRESH = 0.65, 0.196
-_PICTURE_SUFFIXES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg"}
+PICTURE_SUFFIXES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg"}
 _PICTURE_FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 _SWITCHES = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
 
@@ -133,7 +133,7 @@ def find_picture(description: Path, image: str) -> Path:
     """
     beside = (
         description.with_name(PureWindowsPath(image).name or image),
-        *(description.with_suffix(suffix) for suffix in sorted(_PICTURE_SUFFIXES)),
+        *(description.with_suffix(suffix) for suffix in sorted(PICTURE_SUFFIXES)),
     )
     named = description.parent / image
     return next((each for each in (named, *beside) if each.is_file()), named)
@@ -201,7 +201,7 @@ def _occupancy_of_grey(description: _Description) -> NDArray[np.int8]:
 
 
 def _read_description(path: Path) -> _Description:
-    if path.suffix.lower() in _PICTURE_SUFFIXES:
+    if path.suffix.lower() in PICTURE_SUFFIXES:
         raise MapError(
             f"{path.name} is a picture, not the .yaml of a map.",
             hint="Give the .yaml beside it, or the picture with its resolution in metres per cell.",

@@ -26,6 +26,9 @@ from mapspeak.links.dds.participant import DdsNetwork, DdsParticipant
 from mapspeak.links.dds.services import DdsService
 from mapspeak.links.dds.types import HUMBLE, Types
 from mapspeak.links.endpoints import (
+    ARRIVAL_S,
+    FIRST_SIGN_S,
+    LONGEST_LOOK_S,
     SERVICE_PART,
     Decode,
     Sample,
@@ -42,13 +45,8 @@ from mapspeak.ros.robot import NOTHING_SAID, RosRobot, build_ros_robot
 
 logger = logging.getLogger(__name__)
 
-FIRST_SIGN_S = 5.0
-"""Longest wait for the first ROS node to be found."""
 QUIET_S = 0.4
 """Time without a new participant, after which discovery counts as complete."""
-LONGEST_LOOK_S = 3.0
-ARRIVAL_S = 0.5
-"""Wait for the last publications to arrive before leaving."""
 TIME_S = 2.0
 """Longest wait for a node to tell the time."""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 30.0

@@ -11,7 +11,16 @@ from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
-from mapspeak.links.endpoints import Decode, Endpoint, Take, is_hidden, nobody_serves, unknown
+from mapspeak.links.endpoints import (
+    FIRST_SIGN_S,
+    LONGEST_LOOK_S,
+    Decode,
+    Endpoint,
+    Take,
+    is_hidden,
+    nobody_serves,
+    unknown,
+)
 from mapspeak.links.native import NativeLink
 from mapspeak.links.rclpy.endpoints import RclpyReader, RclpyService, RclpyWriter
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
@@ -24,14 +33,8 @@ from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection, keep
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""
 NANOSECONDS = 1_000_000_000
-FIRST_SIGN_S = 5.0
-"""For the first node of others to be found before we begin without.
-
-A call that is lost on a busy machine comes again after three seconds: so Fast DDS has it.
-"""
 QUIET_S = 0.3
 """Without anything new, after which all that is there counts as found."""
-LONGEST_LOOK_S = 3.0
 WATCH_S = 0.2
 """Between two looks at the graph of readers and writers."""
 HINT = (

@@ -8,15 +8,21 @@ import anyio
 from rclpy.duration import Duration
 from rclpy.serialization import deserialize_message, serialize_message
 
-from mapspeak.links.endpoints import Decode, Sample, Take, no_answer, nobody_serves, understand
+from mapspeak.links.endpoints import (
+    ARRIVAL_S,
+    Decode,
+    Sample,
+    Take,
+    no_answer,
+    nobody_serves,
+    understand,
+)
 from mapspeak.links.goals import Answer
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import RclpyTypes, find_message
 
 YOUNG_S = 0.5
 """A known subscriber may discover us this much later, and miss earlier messages."""
-ARRIVAL_S = 0.5
-"""Wait for the last publications to arrive before leaving."""
 
 
 class RclpyReader:

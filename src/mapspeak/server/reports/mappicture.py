@@ -13,6 +13,7 @@ from mapspeak.server.text.world.look import Layer, MapLook, MapView
 from mapspeak.server.text.world.maps import NAVIGATION_PARTS
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
+    EDGE_PX,
     NORTH_UP_RAD,
     Colour,
     LegendEntry,
@@ -88,7 +89,6 @@ GREYS = "White free, grey unknown, black walls; the legend below the map explain
 
 DETAIL_PX_PER_M = 8.0
 """From this scale on doors can be told apart, and areas written into rooms."""
-EDGE_PX = 1000
 MOST_LEFT_OUT = 20
 WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
 

@@ -1,10 +1,12 @@
-"""Sentences that lead to tools, in hints, errors and instructions: only of offered tools."""
+"""Sentences of errors, hints and instructions; those that lead to tools only to offered ones."""
 
 import re
 from collections.abc import Collection, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from string import Formatter
+
+from pydantic import ValidationError
 
 from mapspeak.errors import MapspeakError, NextStep
 
@@ -75,6 +77,33 @@ def say_hint(error: MapspeakError) -> str:
     if error.step is None:
         return error.hint
     return lead(STEPS[error.step], hint=error.hint.removesuffix("."), about=error.about)
+
+
+DISAGREED = (
+    "The person who was asked did not agree. Do not ask again; tell them what you need it for."
+)
+ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
+"""A name of an argument, or the number of an item; pydantic names the tried types among them."""
+INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
+
+
+def explain(name: str, cause: BaseException | None) -> str | None:
+    """Say why a call of a tool failed; None for what is no fault of the call or the robot."""
+    match cause:
+        case MapspeakError():
+            return say_error(cause)
+        case ValidationError():
+            faults = [_fault(error["loc"], error["msg"]) for error in cause.errors()]
+            return f"{name} was called with wrong arguments: {'; '.join(dict.fromkeys(faults))}."
+        case _:
+            return None
+
+
+def _fault(location: tuple[int | str, ...], message: str) -> str:
+    """Say where something is wrong, by the names that the caller gave and no class of ours."""
+    named = [str(part) for part in location if ARGUMENT.fullmatch(str(part))]
+    said = INSTANCE.sub("an object", message)
+    return f"{'.'.join(named) or 'arguments'}: {said[:1].lower()}{said[1:]}"
 
 
 WHAT = (

@@ -20,7 +20,7 @@ from mapspeak.server.text.offered import lead, say_error
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.text.world.descriptions import describe_view
 from mapspeak.server.text.world.drives import not_stopped, say_cause
-from mapspeak.server.tools.asking import (
+from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
     client_of,

@@ -21,7 +21,7 @@ from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports.maps import Report
 from mapspeak.server.text.wording import shorten
-from mapspeak.server.tools.asking import (
+from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
     client_of,

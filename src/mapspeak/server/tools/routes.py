@@ -13,7 +13,7 @@ from mapspeak.driving.routes.planning import RoutePlan
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import RouteAnswer
 from mapspeak.server.text.wording import shorten
-from mapspeak.server.tools.asking import (
+from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
     client_of,

@@ -1,18 +1,21 @@
-"""Access to an address: the allowed Host and Origin, and where a server listens."""
+"""Access to an address: the allowed Host and Origin, the token, and where a server listens."""
 
 import ipaddress
+import secrets
 import socket
 from collections.abc import Callable
 
 import uvicorn
 from mcp.server.transport_security import TransportSecurityMiddleware, TransportSecuritySettings
 from starlette.requests import Request
+from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mapspeak.errors import ConfigError
 
 HEALTH = "/health"
-"""Is answered to anybody."""
+PUBLIC = ("/", HEALTH)
+"""Are answered to anybody."""
 
 
 class ReadyServer(uvicorn.Server):
@@ -43,6 +46,31 @@ class HostGuard:
                 await refusal(scope, receive, send)
                 return
         await self._app(scope, receive, send)
+
+
+class TokenGuard:
+    """Lets only requests through that carry the bearer token."""
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self._app = app
+        self._token = token.encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, or answer 401."""
+        if scope["type"] == "http" and not self._is_welcome(scope):
+            refusal = PlainTextResponse(
+                "A bearer token is needed.", 401, headers={"WWW-Authenticate": "Bearer"}
+            )
+            await refusal(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _is_welcome(self, scope: Scope) -> bool:
+        # The scheme's name is written in any case (RFC 9110, section 11.1).
+        scheme, _, given = dict(scope["headers"]).get(b"authorization", b"").partition(b" ")
+        is_bearer = scheme.lower() == b"bearer"
+        is_right = secrets.compare_digest(given.strip(), self._token)
+        return scope["path"] in PUBLIC or (is_bearer and is_right)
 
 
 def find_security(host: str, port: int) -> TransportSecuritySettings:

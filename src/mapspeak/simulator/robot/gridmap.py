@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Pose
+from mapspeak.simulator.worlds.slices import SUBCELL_BITS
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
 FloatArray = NDArray[np.float64]
@@ -29,9 +30,6 @@ _CERTAIN = math.log(0.98 / 0.02)
 
 _SAME_SURFACE_M = 0.25
 """Neighbouring returns no further apart than this are taken to lie on one surface."""
-
-_SUBCELL_BITS = 6
-"""Binary places of a cell that OpenCV keeps when it draws."""
 
 
 class LogOddsMap:
@@ -202,12 +200,12 @@ def _seen_through(ends: FloatArray, is_return: Mask, window: Window) -> Mask:
     the wall, which no beam has shown to be free.
     """
     picture = np.zeros(_shape_of(window), dtype=np.uint8)
-    corner = np.array([window[1].start, window[0].start], dtype=np.int32) << _SUBCELL_BITS
+    corner = np.array([window[1].start, window[0].start], dtype=np.int32) << SUBCELL_BITS
     corners = _fixed(ends) - corner
-    cv2.fillPoly(picture, [corners], 1, shift=_SUBCELL_BITS)
+    cv2.fillPoly(picture, [corners], 1, shift=SUBCELL_BITS)
     sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     between_returns = list(sides[is_return & np.roll(is_return, -1)])
-    cv2.polylines(picture, between_returns, isClosed=False, color=0, shift=_SUBCELL_BITS)
+    cv2.polylines(picture, between_returns, isClosed=False, color=0, shift=SUBCELL_BITS)
     return picture.astype(bool)
 
 
@@ -242,7 +240,7 @@ def _join_returns(ends_in_map: FloatArray, is_return: Mask) -> FloatArray:
 
 def _fixed(cells: FloatArray) -> NDArray[np.int32]:
     """Return fractional cells as OpenCV draws them: whole numbers are the middles of pixels."""
-    return np.round((cells - 0.5) * (1 << _SUBCELL_BITS)).astype(np.int32)
+    return np.round((cells - 0.5) * (1 << SUBCELL_BITS)).astype(np.int32)
 
 
 def _extent(is_seen: Mask) -> tuple[slice, slice]:

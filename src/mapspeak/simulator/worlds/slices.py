@@ -20,11 +20,11 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 Contour = NDArray[np.float32]
 
-_SUBCELL_BITS = 6
+SUBCELL_BITS = 6
 """Binary places of a pixel that OpenCV keeps when it fills an outline."""
 _FINER = 4
 """Supersampling of filled outlines: OpenCV fills each pixel that an outline touches."""
-_CELL_BITS = _SUBCELL_BITS + 2
+_CELL_BITS = SUBCELL_BITS + 2
 """Binary places of a cell: those of a pixel, and two for the `_FINER` pixels."""
 _SMALLEST_AREA_M2 = 1e-5
 _ROUNDING_M = 0.003
@@ -122,8 +122,8 @@ def fill_outlines(
         cell_size_m: The side of a cell.
         least_ratio: How much of a cell is enough.
     """
-    scale = _FINER * (1 << _SUBCELL_BITS) / cell_size_m
-    half = (1 << _SUBCELL_BITS) / 2
+    scale = _FINER * (1 << SUBCELL_BITS) / cell_size_m
+    half = (1 << SUBCELL_BITS) / 2
     # OpenCV puts whole numbers at the middle of a pixel, we at its corner.
     placed = [
         np.round((corners - (origin.x, origin.y)) * scale - half).astype(np.int32)
@@ -155,7 +155,7 @@ def _shares_inside(placed: Sequence[IntArray], rows: slice, cols: slice) -> NDAr
     picture = np.zeros((n_rows * _FINER, n_cols * _FINER), dtype=np.uint8)
     corner = np.array([cols.start, rows.start], dtype=np.int32) << _CELL_BITS
     for corners in placed:
-        cv2.fillPoly(picture, [corners - corner], 1, shift=_SUBCELL_BITS)
+        cv2.fillPoly(picture, [corners - corner], 1, shift=SUBCELL_BITS)
     down = picture.reshape(n_rows, _FINER, -1).sum(axis=1, dtype=np.uint8)
     return np.asarray(down.reshape(n_rows, n_cols, _FINER).sum(axis=2, dtype=np.uint8))
 

@@ -25,8 +25,8 @@ TARGET_EVERY_M = 1.0
 MOST_TARGETS = 6
 REACH_M = 0.5
 """A robot farther than this from a border cannot look over it."""
-COMFORT_M = 0.1
-"""Clearance beyond its radius that the robot should have at a viewpoint.
+NARROW_COMFORT_M = 0.1
+"""Room beyond its radius that the robot should have at least where many places are compared.
 
 A navigator plans on its own map with its own rounding and padding, and refuses places that are
 just wide enough here. Two cells of a usual map make up for both.
@@ -35,7 +35,7 @@ _TARGET_ANGLES_RAD = np.linspace(0.0, math.tau, 32, endpoint=False)
 AT_ONCE = 256
 """Places whose rays are held in memory together."""
 
-SIGHT_M = 8.0
+LOOK_M = 8.0
 """Range limit of a look; rooms limit what a LiDAR could see beyond."""
 STEP_M = 0.15
 """Sampling distance along rays; walls are thicker, as small holes in them are closed."""
@@ -114,7 +114,7 @@ def _spread_out(rows: IntArray, cols: IntArray, n_cells: int) -> list[int]:
 
 def _find_cells(distances: DistanceField, rows: IntArray, cols: IntArray) -> IntArray:
     """Return the flat index of the best cell to stand in for each target; -1 for none."""
-    comfort_m = distances.radius_m + COMFORT_M
+    comfort_m = distances.radius_m + NARROW_COMFORT_M
     cells = rows * distances.grid.n_cols + cols
     is_good = distances.reachable[rows, cols] & (distances.clearances_m[rows, cols] >= comfort_m)
     others = np.flatnonzero(~is_good)
@@ -138,7 +138,7 @@ def _find_cells_off(distances: DistanceField, rows: IntArray, cols: IntArray) ->
     is_passed = distances.grid.free.ravel()[rays.cells] & rays.is_inside & (is_wide | is_reachable)
     is_passed[:, :, 0] = True
     is_seen = np.logical_and.accumulate(is_passed, axis=2)
-    room_m = np.minimum(clearances_m, distances.radius_m + COMFORT_M)
+    room_m = np.minimum(clearances_m, distances.radius_m + NARROW_COMFORT_M)
     # A step further away must gain more room than the whole weight of the distance.
     worth = np.where(is_seen & is_reachable, room_m - steps * 1e-6, -np.inf)
     flat = worth.reshape(rows.size, -1)
@@ -211,7 +211,7 @@ def find_views(grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Ce
         clearances_m: From each of its cells to the nearest obstacle.
     """
     stride = max(round(STEP_M / grid.resolution_m), 1)
-    steps = np.arange(stride, SIGHT_M / grid.resolution_m + 1e-6, stride)
+    steps = np.arange(stride, LOOK_M / grid.resolution_m + 1e-6, stride)
     depths, n_passed, n_met = [np.zeros((0, N_RAYS, steps.size), dtype=np.uint8)], 0, 0
     for start in range(0, len(places), AT_ONCE):
         is_unknown, is_open = _look(grid, clearances_m, places[start : start + AT_ONCE], steps)
@@ -256,7 +256,7 @@ def remaining_ratio(grid: OccupancyGrid, frontier: Frontier) -> float:
     from afar what it was sent to see. The map may have grown and moved its origin since.
     """
     place = grid.cell_at(frontier.pose.point)
-    reach = math.ceil((SIGHT_M + WALL_HOLE_M) / grid.resolution_m)
+    reach = math.ceil((LOOK_M + WALL_HOLE_M) / grid.resolution_m)
     # The map around it, wherever it is, with unknown outside the array.
     cells = np.full((2 * reach + 1, 2 * reach + 1), UNKNOWN, dtype=np.int8)
     rows, cols = grid.window(place.row, place.col, margin=reach)

@@ -21,7 +21,7 @@ from mapspeak.spatial.paths.lattice import (
 from mapspeak.spatial.paths.wavefront import ROUNDING, Costs, Seeds, descend, spread
 from mapspeak.spatial.visibility import mean_on_line
 
-COMFORT_M = 0.4
+WALLS_REACH_M = 0.4
 """Walls cease to matter where the robot's edge has this much room."""
 WALL_WEIGHT = 2.0
 """A metre of way that grazes a wall counts as this many metres more."""
@@ -122,7 +122,7 @@ def find_way(
 
 def _wall_weights(lattice: Lattice, radius_m: float) -> Costs:
     """Return the cost of a metre in each cell: 1 in the open, more towards walls."""
-    lacking = (radius_m + COMFORT_M - lattice.clearance_m) / COMFORT_M
+    lacking = (radius_m + WALLS_REACH_M - lattice.clearance_m) / WALLS_REACH_M
     np.clip(lacking, 0.0, 1.0, out=lacking)
     return np.asarray(1 + WALL_WEIGHT * lacking**2, dtype=np.float32)
 
@@ -131,7 +131,7 @@ def _build_corridor(
     lattice: Lattice, way: IntArray, costs: Costs, radius_m: float
 ) -> tuple[Lattice, tuple[slice, slice]]:
     """Return the fine lattice of the cells near a way, and the part of the map that it covers."""
-    margin = int(np.ceil((CORRIDOR_M + radius_m + COMFORT_M) / lattice.cell_size_m))
+    margin = int(np.ceil((CORRIDOR_M + radius_m + WALLS_REACH_M) / lattice.cell_size_m))
     rows, cols = np.divmod(way, lattice.n_cols)
     top, left = max(int(rows.min()) - margin, 0), max(int(cols.min()) - margin, 0)
     shape = (int(rows.max()) + margin + 1 - top, int(cols.max()) + margin + 1 - left)

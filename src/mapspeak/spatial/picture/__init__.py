@@ -1,6 +1,7 @@
 """The map picture: grey levels, metric grid with numbers, the robot's arrow, marks and areas."""
 
 from mapspeak.spatial.picture.drawing import (
+    EDGE_PX,
     MapPicture,
     draw_map,
     draw_map_axis,
@@ -24,6 +25,7 @@ from mapspeak.spatial.picture.plan import Zoom
 from mapspeak.spatial.picture.transform import NORTH_UP_RAD, Box, PictureView, paper_spacing_m
 
 __all__ = [
+    "EDGE_PX",
     "NORTH_UP_RAD",
     "Box",
     "Colour",

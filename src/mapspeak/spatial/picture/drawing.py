@@ -56,6 +56,7 @@ from mapspeak.spatial.picture.transform import (
 _GROUNDS = {FREE: "free", UNKNOWN_GROUND: "unknown", WALL: "wall"}
 _PAPER_GROUNDS = {int(GREYS[1]): "free", int(GREYS[0]): "unknown", int(GREYS[-1]): "occupied"}
 EDGE_PX = 1000
+"""The longest edge of the pictures that are shown."""
 _LEGEND_RIM_PX = 5
 _MAX_LEGEND_RATIO = 0.4
 
@@ -143,21 +144,21 @@ def draw_map_plain(grid: OccupancyGrid) -> MapPicture:
     return MapPicture(png=_encode(paint_paper_ground(grid, view)), view=view)
 
 
-def draw_map_axis(grid: OccupancyGrid, *, max_edge_px: int = EDGE_PX) -> MapPicture:
+def draw_map_axis(grid: OccupancyGrid) -> MapPicture:
     """Draw the whole map with its axes and the paper's adaptive metric grid (eqs. 2 to 6)."""
-    return _draw_with_axes(grid, MapLayers(), max_edge_px)
+    return _draw_with_axes(grid, MapLayers())
 
 
 def draw_robot_pose(grid: OccupancyGrid, robot: Pose) -> MapPicture:
     """Draw the same with the robot as an arrow along its heading (eq. 7)."""
-    return _draw_with_axes(grid, MapLayers(robot=robot), EDGE_PX)
+    return _draw_with_axes(grid, MapLayers(robot=robot))
 
 
-def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers, max_edge_px: int) -> MapPicture:
+def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers) -> MapPicture:
     extent = plan.extent_of_map(grid, NORTH_UP_RAD)
     spacing_m = paper_spacing_m(extent.width_m, extent.height_m, grid.resolution_m)
     legend = Legend(spacing_m=spacing_m, grounds=_PAPER_GROUNDS)
-    view = _plan_sheet(grid, extent, legend, up_rad=NORTH_UP_RAD, max_edge_px=max_edge_px)
+    view = _plan_sheet(grid, extent, legend, up_rad=NORTH_UP_RAD, max_edge_px=EDGE_PX)
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     view.area_of(canvas)[:] = paint_paper_ground(grid, view)
     axes.draw_axes(canvas, view, spacing_m)

@@ -23,9 +23,8 @@ from mapspeak.ros.messages.poses import read_pose_stamped, read_transforms
 from mapspeak.ros.messages.scans import LaserScan, mend_scan, read_cloud, read_scan
 from mapspeak.server.text.ros.values import show_message, show_value
 from mapspeak.server.text.wording import say_point, say_pose
-from mapspeak.spatial.picture import draw_map_axis
+from mapspeak.spatial.picture import EDGE_PX, draw_map_axis
 
-EDGE_PX = 1000
 LARGEST_BYTES = 700_000
 AHEAD_RAD = math.radians(15)
 ANGLES, RANGE_LIMITS = ("angle_min", "angle_increment"), ("range_min", "range_max")
@@ -100,7 +99,7 @@ def _view_grid(message: Message) -> MessageView:
     frame, _ = read_header(message)
     free, full, unknown = (mask.mean() for mask in (grid.free, grid.occupied, grid.unknown))
     free_m2 = free * grid.width_m * grid.height_m
-    picture = draw_map_axis(grid, max_edge_px=EDGE_PX)
+    picture = draw_map_axis(grid)
     text = (
         f"Grid of {grid.n_cols} x {grid.n_rows} cells of {grid.resolution_m:g} m "
         f"({grid.width_m:.1f} x {grid.height_m:.1f} m), frame {frame}, lower left corner at "

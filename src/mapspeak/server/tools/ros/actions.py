@@ -12,7 +12,7 @@ from mapspeak.server.text.ros.listening import list_page, say_loss
 from mapspeak.server.text.ros.outcomes import NO_TYPE_TOLD, ONE_OF_BOTH, say_goal, say_goals
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.wording import say_count
-from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
+from mapspeak.server.tools.caller import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.publishing import check_frames

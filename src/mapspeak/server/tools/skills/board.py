@@ -13,7 +13,7 @@ from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import say_error
 from mapspeak.server.text.skills import describe_skill
-from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
+from mapspeak.server.tools.caller import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter

@@ -15,7 +15,7 @@ from mapspeak.server.text.skills import (
     say_question,
     say_skills,
 )
-from mapspeak.server.tools.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
+from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.toolset import ToolEffect, tool

@@ -11,7 +11,7 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.ros.values import cut, show_message
 from mapspeak.server.text.skills import CODES, GOES_ON, say_conditions, say_remark, say_waiting
 from mapspeak.server.text.wording import say_count
-from mapspeak.server.tools.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
+from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import SkillOutcome, SkillState
 from mapspeak.skills.questions import QuestionBook

@@ -1,4 +1,4 @@
-"""The caller of a tool, progress of its drives, and approval by a person through the client."""
+"""The caller of a tool: which client, how long it waits, progress, approval by its person."""
 
 from typing import Any
 
