@@ -1,12 +1,15 @@
-"""Remembered things by what they are called: one, the nearest, the second-farthest, all."""
+"""Remembered things by what they are called: one, the nearest, all, and those to be forgotten."""
 
 import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.memory import MemoryStore
 from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_views, view_of
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import (
     MOST_NAMED,
@@ -18,7 +21,7 @@ from mapspeak.places.naming import (
 from mapspeak.places.standing import find_stand_off, stand_before
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 RANKS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 ORDERED = re.compile(
@@ -184,3 +187,66 @@ def _say_candidates(world: WorldModel, called: Sequence[RememberedThing]) -> str
         told.append(f"{each.id} in {rooms}, {'no way' if path_m is None else f'{path_m:.1f} m'}")
     n_more = len(called) - len(told)
     return ", ".join(told) + (f" and {n_more} more" if n_more else "")
+
+
+AROUND_M = 5.0
+"""Largest distance from the robot to a thing that a person says is gone."""
+
+
+def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:
+    """Forget a place, or a thing in all records that name it.
+
+    Args:
+        words: An id, the name of a place, or the label of a thing.
+
+    Raises:
+        SemanticMapError: Nothing is called so, or it cannot be written.
+        AmbiguousPlaceError: Several things are.
+    """
+    place = _find_place(world, words)
+    if place is not None:
+        return forget_place(store, place.waypoint.name)
+    called = find_things(world, words)
+    if not called:
+        raise SemanticMapError(
+            f"Nothing is remembered as {words[:80]!r}.", hint="Give its id, such as T4 or W2."
+        )
+    if len(called) > 1:
+        ids = [each.id for each in called]
+        raise AmbiguousPlaceError(
+            f"{len(called)} remembered things are called {words[:80]!r}: {', '.join(ids)}.",
+            hint="Give the id of the one that is meant.",
+            words=words,
+            meanings=ids,
+        )
+    return forget_thing(store, called[0])
+
+
+def find_gone(world: WorldModel, words: str, here: Point) -> list[RememberedThing]:
+    """Return the things that a person may mean who looks from a point and says: it is gone."""
+    called = find_things(world, words)
+    if THING_ID.fullmatch(words.strip()):
+        return called
+    return [
+        each
+        for each in called
+        if each.thing.position is not None and each.thing.position.distance_to(here) <= AROUND_M
+    ]
+
+
+def forget_thing(store: MemoryStore, remembered: RememberedThing) -> Forgotten:
+    """Forget a thing, whatever records name it."""
+    views = {view_of(each.waypoint, each.landmark) for each in remembered.thing.supporting}
+    return forget_views(store, views)
+
+
+def _find_place(world: WorldModel, words: str) -> RememberedPlace | None:
+    wanted = words.strip().casefold()
+    return next(
+        (
+            each
+            for each in world.places
+            if wanted in (each.id.casefold(), each.waypoint.name.casefold())
+        ),
+        None,
+    )

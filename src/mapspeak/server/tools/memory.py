@@ -24,8 +24,8 @@ from mapspeak.memory.store.forgetting import restore
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import find_renamed
 from mapspeak.places.recall import events
-from mapspeak.places.recall.forgetting import forget
 from mapspeak.places.recall.nearby import find_nearby
+from mapspeak.places.things import forget
 from mapspeak.server.text.findings import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     describe_check,

@@ -15,7 +15,7 @@ from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_ke
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall.asking import find_speaking_places
-from mapspeak.places.recall.forgetting import find_gone, forget_thing
+from mapspeak.places.things import find_gone, forget_thing
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.reports.mappicture import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
