@@ -17,7 +17,7 @@ from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
 from mapspeak.ros.link import Advertising, Patience, plain_errors, say_again
 from mapspeak.ros.messages.fields import Dialect, Message
-from mapspeak.ros.nodes import ParameterServices
+from mapspeak.ros.parameters import ParameterServices
 
 
 def new_id() -> str:

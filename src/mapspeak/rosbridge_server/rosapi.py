@@ -7,7 +7,7 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages.fields import Dialect, bare_type, write_stamp
-from mapspeak.ros.nodes import FIELD_OF_KIND, KIND_OF, NOT_SET
+from mapspeak.ros.parameters import FIELD_OF_KIND, KIND_OF, NOT_SET
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Topic
 from mapspeak.rosbridge_server.interfaces import (
     ROS2_DISTRIBUTION,

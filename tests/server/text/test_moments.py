@@ -18,7 +18,7 @@ def test_what_the_schema_of_an_event_names_is_read(written: str) -> None:
 
 @pytest.mark.parametrize("written", re.split(r", | or ", PAST))
 def test_what_the_schema_of_a_search_names_is_read_as_past(written: str) -> None:
-    moment = read_moment(written, NOW)
+    moment = read_past(written, None, NOW)[0]
     assert moment is not None
     assert moment <= NOW
 
@@ -50,7 +50,7 @@ def test_a_span_is_counted_ahead_for_events_unless_it_says_ago(
 def test_a_span_is_counted_back_for_episodes_unless_it_says_in(
     written: str, ahead_s: float
 ) -> None:
-    assert read_moment(written, NOW) == NOW + timedelta(seconds=ahead_s)
+    assert read_past(written, None, NOW)[0] == NOW + timedelta(seconds=ahead_s)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import anyio
 
+from mapspeak.ros.census import Census, Nodes
 from mapspeak.ros.listening import Heard
 from mapspeak.ros.messages.fields import Dialect, Message, find_stamp
-from mapspeak.ros.nodes import Census, Nodes
 from mapspeak.ros.port import EndQuality, NodeLinks, OwnEnds, RosConnection, RosGraph, TopicQuality
 from mapspeak.server.text.wording import list_some
 

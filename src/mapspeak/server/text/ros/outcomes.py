@@ -9,8 +9,8 @@ from mapspeak.errors import ConfigError, GoalError, LinkError, MapspeakError
 from mapspeak.installation import shell_command
 from mapspeak.ros.actions import ActionClient
 from mapspeak.ros.activity import ActionGoal, ActionState
+from mapspeak.ros.census import Nodes
 from mapspeak.ros.definitions.types import Field
-from mapspeak.ros.nodes import Nodes
 from mapspeak.ros.port import RosConnection, find_nearest
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.ros.listening import say_loss, say_nodes

@@ -7,10 +7,10 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError
+from mapspeak.ros.census import ask_each, fetch_publishers
 from mapspeak.ros.definitions.types import measure_message
 from mapspeak.ros.listening import hear_frames
 from mapspeak.ros.messages.fields import Message
-from mapspeak.ros.nodes import ask_each, fetch_publishers
 from mapspeak.server.text.ros.frames import say_frames, say_transform
 from mapspeak.server.text.ros.listening import say_measured, say_senders, say_silent
 from mapspeak.server.text.ros.outcomes import refuse_name

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros.census import ask_each
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.ros.nodes import ask_each
 from mapspeak.ros.port import find_nearest
 from mapspeak.safety import SetParameter
 from mapspeak.server.text.ros.listening import (

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
-from mapspeak.ros.nodes import find_server
+from mapspeak.ros.census import find_server
 from mapspeak.safety import Call
 from mapspeak.server.text.ros.listening import list_page, say_stamp
 from mapspeak.server.text.ros.values import cut, show_message

@@ -7,9 +7,9 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros.census import Nodes, fetch_publishers, fetch_subscribers, take_census
 from mapspeak.ros.listening import Heard
 from mapspeak.ros.messages.fields import BULKY, Message, bare_type
-from mapspeak.ros.nodes import Nodes, fetch_publishers, fetch_subscribers, take_census
 from mapspeak.safety import Publish
 from mapspeak.server.text.ros.listening import (
     count_ends,

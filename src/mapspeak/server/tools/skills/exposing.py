@@ -10,8 +10,8 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError, MapspeakError, PolicyError
+from mapspeak.ros.census import fetch_publishers, fetch_subscribers
 from mapspeak.ros.messages.fields import bare_type
-from mapspeak.ros.nodes import fetch_publishers, fetch_subscribers
 from mapspeak.ros.port import RosGraph
 from mapspeak.safety import GuardedConnection
 from mapspeak.server.tools.ros.goals import RosAccess
