@@ -8,8 +8,9 @@ from embedding import ConceptEmbedder
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate, find_candidates
 from mapspeak.driving.search.evidence import Opinions, find_context_score, speaks_of, weight_of
-from mapspeak.driving.search.progress import Budget, SearchProgress, SearchState, SeenFloor
+from mapspeak.driving.search.progress import Budget, SearchProgress, SearchState
 from mapspeak.driving.search.searcher import Judgement, Searcher
+from mapspeak.driving.search.seenfloor import SeenFloor
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.places.relations.choosing import find_place

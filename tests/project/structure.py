@@ -53,6 +53,37 @@ def find_circles(modules: dict[Path, ast.Module]) -> set[tuple[str, ...]]:
     return {tuple(sorted(map(str, ring))) for ring in rings if len(ring) > 1}
 
 
+def find_rings(modules: dict[Path, ast.Module]) -> set[tuple[str, ...]]:
+    """Return the groups of modules that import each other while they are imported."""
+    uses = {
+        path: {
+            found
+            for node in module.body
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mapspeak")
+            for alias in node.names
+            if (found := _module_of(f"{node.module}.{alias.name}", modules))
+        }
+        for path, module in modules.items()
+    }
+    reached = {path: _reach(path, uses) for path in modules}
+    rings = (
+        {other for other in others if path in reached[other]} for path, others in reached.items()
+    )
+    return {tuple(sorted(map(str, ring))) for ring in rings if ring}
+
+
+def _module_of(name: str, modules: dict[Path, ast.Module]) -> Path | None:
+    """Return the file that an imported name comes from: a module, else what holds the name."""
+    parts = name.split(".")[1:]
+    for place in (parts, parts[:-1]):
+        for path in (
+            (Path(*place[:-1], f"{place[-1]}.py"), Path(*place, "__init__.py")) if place else ()
+        ):
+            if path in modules:
+                return path
+    return None
+
+
 def find_texts_with_tools(modules: dict[Path, ast.Module]) -> dict[str, int]:
     """Return how many texts name a tool, in each module that must not know which there are."""
     tools = json.loads((CHECKOUT / "tests/snapshots/tools.json").read_text(encoding="utf-8"))

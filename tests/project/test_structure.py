@@ -12,6 +12,7 @@ from project.structure import (
     find_circles,
     find_doubled_classes,
     find_fields_with_words,
+    find_rings,
     find_texts_with_tools,
     read_source,
 )
@@ -31,6 +32,10 @@ def test_no_two_public_classes_share_a_name() -> None:
 
 def test_no_folders_import_each_other_in_circles() -> None:
     assert find_circles(source()) <= set(map(tuple, left("folders in circles of imports")))
+
+
+def test_no_modules_import_each_other_in_rings() -> None:
+    assert find_rings(source()) == set()
 
 
 def test_no_text_below_the_server_names_a_tool() -> None:

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from mapspeak.driving.search.evidence import Opinions, weight_of
-from mapspeak.driving.search.progress import REACH_M, SeenFloor
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture
 from mapspeak.memory.search.answer import Verdict

@@ -24,14 +24,13 @@ from mapspeak.driving.search.evidence import (
     speaks_of,
 )
 from mapspeak.driving.search.progress import (
-    REACH_M,
     Budget,
     BudgetKind,
     SearchProgress,
     SearchState,
-    SeenFloor,
     find_seen_regions,
 )
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture, name_key
 from mapspeak.robot import CameraPicture, Detection
