@@ -135,6 +135,7 @@ _LAMP_REACH_M = 10.0
 _LAMP_GAP_M = 0.3
 """Distance of lamps from walls."""
 _LAMP_STRENGTH = 0.5
+_ROUNDING_M = 1e-3
 _AMBIENT = 0.38
 _FROM_FLOOR = 0.22
 _FROM_SIDE = (0.09, 0.05, 0.0)
@@ -167,11 +168,18 @@ class Light:
         points, directions = places.astype(np.float32), normals.astype(np.float32)
         from_floor = _FROM_FLOOR * np.maximum(-directions[:, 2], 0.0)
         light = _AMBIENT + from_floor + directions @ np.array(_FROM_SIDE, dtype=np.float32)
-        x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-        for lamp, reach in zip(self.lamps.astype(np.float32), self.reach_m, strict=True):
-            is_near = (x - lamp[0]) ** 2 + (y - lamp[1]) ** 2 < _LAMP_REACH_M**2
-            near = np.flatnonzero(is_near)
-            light[near] += _shine(lamp, reach, points[near], directions[near])
+        lamps = self.lamps.astype(np.float32)
+        # What is not below the lamps, or is turned away from one, gets nothing of it.
+        below = np.flatnonzero(points[:, 2] < lamps[:, 2].max(initial=0.0))
+        x, y, z = points[below].T.copy()
+        across, along, up = directions[below].T.copy()
+        ahead = across * x + along * y + up * z - np.float32(_ROUNDING_M)
+        for lamp, reach in zip(lamps, self.reach_m, strict=True):
+            is_lit = across * lamp[0] + along * lamp[1] + up * lamp[2] > ahead
+            is_lit &= (x - lamp[0]) ** 2 + (y - lamp[1]) ** 2 < _LAMP_REACH_M**2
+            lit = below[is_lit]
+            there, facing = points.take(lit, axis=0), directions.take(lit, axis=0)
+            light[lit] += _shine(lamp, reach, there, facing)
         exposed = 1.0 - np.exp(-_EXPOSURE * np.maximum(light, 0.0))
         exposed *= _occlude(self.crowding, self.ceiling_m, points, directions)
         return np.asarray(exposed ** (1 / _GAMMA), dtype=np.float32)
