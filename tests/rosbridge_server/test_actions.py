@@ -1,16 +1,21 @@
 """Goals over rosbridge: Nav2's action on ROS 2, move_base's topics on ROS 1."""
 
+from collections.abc import Callable
 from typing import Any
 
+import anyio
 import pytest
 
 from bridging import RawClient, SteppedRobot, bridge
-from fakes import two_rooms
+from fakes import FakeRobot, two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
+from mapspeak.rosbridge_server.hub import Hub, Publication
+from mapspeak.rosbridge_server.navigation import Drives, MoveBase, Nav2
+from mapspeak.rosbridge_server.stack import topics_of
 
 pytestmark = pytest.mark.anyio
 
@@ -344,3 +349,45 @@ async def test_ros_1_has_no_operations_on_goals() -> None:
         await send_goal(client, "one")
         assert await client.all_before() == []
     assert robot.goals == {}
+
+
+class GivingUp(SteppedRobot):
+    """A robot whose client gives up while it takes a goal."""
+
+    give_up: Callable[[], None]
+
+    async def send_goal(self, goal: Pose) -> str:
+        goal_id = await super().send_goal(goal)
+        self.give_up()
+        await anyio.lowlevel.checkpoint()
+        return goal_id
+
+
+async def test_a_goal_whose_client_goes_while_the_robot_takes_it_can_be_cancelled() -> None:
+    robot = GivingUp(two_rooms())
+    drives = Drives(robot)
+    with anyio.CancelScope() as scope:
+        robot.give_up = scope.cancel
+        await drives.start(AHEAD)
+    (drive,) = drives.under_way
+    await drives.cancel(drive)
+    assert robot.ended["fake-1"].state is GoalState.CANCELLED
+
+
+@pytest.mark.parametrize("dialect", Dialect)
+@pytest.mark.parametrize("state", [each for each in GoalState if each.is_final])
+async def test_every_end_that_a_robot_can_tell_is_told_on(
+    state: GoalState, dialect: Dialect
+) -> None:
+    robot = FakeRobot(two_rooms())
+    hub, drives = Hub(topics_of(dialect, robot.description)), Drives(robot)
+    told: list[Publication] = []
+    topic = {Dialect.ROS1: "/move_base/status", Dialect.ROS2: f"{ACTION}/_action/status"}[dialect]
+    hub.subscribe(topic, "actionlib_msgs/GoalStatusArray", told.append)
+    _ = (MoveBase if dialect is Dialect.ROS1 else Nav2)(robot, hub, drives)
+    await drives.start(AHEAD)
+    robot.end_goal(state)
+    await drives.look()
+    assert not drives.under_way
+    (ended,) = told[-1].message["status_list"]
+    assert ended["status"] >= 2

@@ -12,12 +12,13 @@ from anyio.streams.buffered import BufferedByteReceiveStream
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, LinkError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.transport import HangUpWatch, serve_http
 from mapspeak.server.wire.access import TokenGuard
 from mapspeak.session import Session
+from skillmaking import FakeSkill, never, spec
 
 pytestmark = pytest.mark.anyio
 
@@ -249,3 +250,30 @@ async def test_a_line_that_is_no_message_is_answered_and_the_talk_goes_on() -> N
     codes = [each["error"]["code"] for each in told if each["id"] is None]
     assert codes == [-32700, -32600]
     assert {each["id"] for each in told if "result" in each} == {1, 4}
+
+
+class Unreachable(FakeRobot):
+    """A robot that hears no stop."""
+
+    async def stop(self) -> None:
+        raise LinkError("There is no connection.", hint="Wait.")
+
+
+async def test_the_skills_of_a_client_that_is_gone_end_though_the_robot_is_out_of_reach(
+    tmp_path: Path,
+) -> None:
+    session = Session(Unreachable(two_rooms()), SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
+    server = build_server(session)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(server.keep_skills)
+        await anyio.wait_all_tasks_blocked()
+        run = await server.skills.runs.begin(
+            FakeSkill(spec(), do=never), {}, client="mine", wait_s=0.0
+        )
+        with session.drives.preparing() as ticket:
+            goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
+            await session.drives.start(goal.pose, place=goal.name, ticket=ticket, client="mine")
+        with pytest.raises(LinkError):
+            await server.note_hang_up("mine")
+        assert run.is_over
+        tasks.cancel_scope.cancel()

@@ -86,6 +86,12 @@ class Drives:
         Raises:
             MapspeakError: The robot refuses.
         """
+        # Of a client that goes meanwhile the robot has the goal all the same: it must be known.
+        with anyio.CancelScope(shield=True):
+            drive = await self._start(goal, goal_id)
+        return drive
+
+    async def _start(self, goal: Pose, goal_id: str | None) -> ServedDrive:
         async with self._turn:
             robot_goal_id = await self._robot.send_goal(goal)
             await self._look_at_all()
@@ -159,6 +165,7 @@ STATUS = {
     GoalState.BLOCKED: ABORTED,
     GoalState.PREEMPTED: ABORTED,
     GoalState.LOST: ABORTED,
+    GoalState.TIMED_OUT: ABORTED,
     GoalState.REJECTED: ABORTED,
 }
 TF_ERROR, FAILED_TO_MAKE_PROGRESS = 9002, 105
@@ -256,7 +263,7 @@ def status_of(drive: ServedDrive) -> int:
 def result_of(drive: ServedDrive) -> dict[str, Any]:
     """Return the action's result of a drive that has ended."""
     cause = drive.status.cause
-    is_failed = drive.status.state in (GoalState.BLOCKED, GoalState.LOST)
+    is_failed = drive.status.state in (GoalState.BLOCKED, GoalState.LOST, GoalState.TIMED_OUT)
     return {
         "error_code": FAILED_TO_MAKE_PROGRESS if is_failed else 0,
         "error_msg": cause.quote if is_failed and cause is not None else "",
@@ -282,6 +289,7 @@ ACTIONLIB = {
     ),
     GoalState.BLOCKED: (4, "Failed to find a valid plan."),
     GoalState.LOST: (4, "The robot has lost this goal."),
+    GoalState.TIMED_OUT: (4, "The robot has come no nearer to this goal."),
     GoalState.REJECTED: (5, ""),
 }
 """By actionlib_msgs/GoalStatus, and what it says."""

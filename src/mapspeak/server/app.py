@@ -239,8 +239,10 @@ class MapspeakServer(MCPServer[Any]):
 
     async def note_hang_up(self, client: str) -> None:
         """Stop the drive and end the skills of a client that is gone."""
-        await self._session.client_is_gone(client)
-        await self.skills.runs.client_is_gone(client)
+        try:
+            await self._session.client_is_gone(client)
+        finally:
+            await self.skills.runs.client_is_gone(client)
 
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None

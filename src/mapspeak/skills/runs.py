@@ -37,14 +37,16 @@ class SkillRun:
 
     Attributes:
         handle: Its name for the model, such as "S1".
-        client: Its owner; it ends when that client is gone.
+        client: Its owner; it ends when that client is gone. None for a run that is nobody's.
         n_stops_before: The count of stops when it began.
         progress: The latest; None before the first.
         outcome: None while it goes on, and where it could not be begun.
         error: Why it could not be begun.
     """
 
-    def __init__(self, handle: str, skill: Skill, *, client: str, n_stops_before: int) -> None:
+    def __init__(
+        self, handle: str, skill: Skill, *, client: str | None, n_stops_before: int
+    ) -> None:
         self.handle = handle
         self.skill = skill
         self.client = client
@@ -181,7 +183,7 @@ class SkillRuns:
         skill: Skill,
         arguments: Arguments,
         *,
-        client: str = "",
+        client: str | None = None,
         wait_s: float,
         on_news: OnNews | None = None,
     ) -> SkillRun:
