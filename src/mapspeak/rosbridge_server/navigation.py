@@ -86,16 +86,12 @@ class Drives:
         Raises:
             MapspeakError: The robot refuses.
         """
-        # Of a client that goes meanwhile the robot has the goal all the same: it must be known.
-        with anyio.CancelScope(shield=True):
-            drive = await self._start(goal, goal_id)
-        return drive
-
-    async def _start(self, goal: Pose, goal_id: str | None) -> ServedDrive:
         async with self._turn:
-            robot_goal_id = await self._robot.send_goal(goal)
-            await self._look_at_all()
-            status = await self._robot.fetch_goal_status(robot_goal_id)
+            # Of a client that goes meanwhile the robot has the goal all the same: it must be known.
+            with anyio.CancelScope(shield=True):
+                robot_goal_id = await self._robot.send_goal(goal)
+                await self._look_at_all()
+                status = await self._robot.fetch_goal_status(robot_goal_id)
             if status.state is GoalState.REJECTED:
                 said = "" if status.cause is None else status.cause.quote
                 raise GoalError(f"Goal rejected: {said}", hint="Choose another.")
