@@ -494,6 +494,16 @@ async def test_a_message_in_countless_empty_frames_costs_the_connection() -> Non
         assert await client.call_service("/echo", {"a": 1}) == {"a": 1}
 
 
+async def test_a_latched_topic_is_advertised_as_such() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        client.advertise("/markers", type_name=TWIST, is_latched=True)
+        client.advertise("/cmd_vel", type_name=TWIST)
+        await server.until(lambda: len(server.asked("advertise")) == 4)
+    latched = {each["topic"]: each.get("latch") for each in server.asked("advertise")}
+    assert latched == {"/markers": True, "/cmd_vel": None}
+
+
 async def test_countless_empty_frames_behind_the_greeting_are_no_rosbridge() -> None:
     async def greet(stream: ByteStream) -> None:
         protocol = ServerProtocol()

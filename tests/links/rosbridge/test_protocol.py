@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.protocol.bounds import FrameFault
+from mapspeak.links.rosbridge.protocol.bounds import MAX_UNFINISHED, FragmentStore, FrameFault
 from mapspeak.links.rosbridge.protocol.codec import BARE_NUMBER
 from mapspeak.links.rosbridge.protocol.conversation import (
     LIGHT_BYTES,
@@ -440,3 +440,12 @@ def test_only_a_small_frame_with_nothing_wrapped_in_it_is_light() -> None:
     assert not conversation.is_light(frame(HELLO) + b" " * LIGHT_BYTES)
     assert not conversation.is_light(pieces_of(json.dumps(HELLO), 1)[0])
     assert not conversation.is_light(b'{"op": "fr\\u0061gment", "data": ""}')
+
+
+def test_of_many_unfinished_messages_the_oldest_are_forgotten_however_small_they_are() -> None:
+    store = FragmentStore()
+    for number in range(20):
+        store.add({"id": str(number), "num": 0, "total": 2, "data": "x" * 10})
+    assert store.n_bytes == 10 * MAX_UNFINISHED
+    assert store.add({"id": "0", "num": 1, "total": 2, "data": "y"}) is None
+    assert store.add({"id": "19", "num": 1, "total": 2, "data": "y"}) == b"x" * 10 + b"y"

@@ -32,6 +32,8 @@ Radius = Annotated[
 ]
 Full = Annotated[bool, Field(description="also what is unchanged")]
 UpIs = Annotated[Up, Field(description="what points up")]
+MOST_READERS = 50
+"""Of more sessions the one that looked longest ago is told everything again."""
 
 
 class LookTools:
@@ -80,7 +82,10 @@ class LookTools:
         told = Told(None if full or client is None else self._told.get(client))
         shown = await self._session.compute(lambda: show(view, self._representation, told))
         if client is not None:
+            self._told.pop(client, None)
             self._told[client] = told.keep(list_subjects(world))
+            for oldest in list(self._told)[:-MOST_READERS]:
+                del self._told[oldest]
         pictures = [] if shown.png is None else [Image(data=shown.png, format="png")]
         warning = await say_moved(self._session.compute(self._session.keeper.compare))
         text = f"Warning: {warning}\n{shown.text}" if warning else shown.text
