@@ -5,7 +5,7 @@ is off by 6 degrees (standard deviation), and no range is told. As the baseline 
 four things that have nothing in common. Synonyms: drawn buildings that nothing was chosen on
 (MAPSPEAK_SEED), each thing seen from three places as `benchmarks.memory` has it, one label in five
 another word for the same, from a list that was written without looking at the product's. As the
-baseline the same looks without other words.
+baseline the same looks without other words. By an eye that errs as people do, and by a detector.
 """
 
 import math
@@ -18,7 +18,7 @@ from types import MappingProxyType
 import numpy as np
 
 from benchmarks.figure import Figure
-from benchmarks.memory.observer import Memory, observe
+from benchmarks.memory.observer import DETECTOR, NOISY, Eye, Memory, observe
 from benchmarks.memory.sites import Site
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
@@ -159,16 +159,21 @@ def _draw_room() -> OccupancyGrid:
 
 
 def _measure_synonyms() -> Iterator[Figure]:
+    for eye, most, seen_by in ((NOISY, 10, "a noisy eye"), (DETECTOR, 5, "a detector")):
+        yield from _measure_surplus(eye, f"seen three times by {seen_by} ({most} at most)")
+
+
+def _measure_surplus(eye: Eye, seen: str) -> Iterator[Figure]:
     counts: Counter[str] = Counter()
     for style in style_names():
         site = Site(parse_world(draw_plan(style, seed=SEED), name=style))
-        memory = observe(site, seed=SEED, has_ranges=True)
+        memory = observe(site, seed=SEED, has_ranges=True, eye=eye)
         counts["things"] += len(memory.annotated)
         counts["one name"] += _count_surplus(site, memory, memory.places, {})
         renamed = _with_synonyms(memory, np.random.default_rng(SEED))
         counts["synonyms"] += _count_surplus(site, memory, *renamed)
     for what in ("one name", "synonyms"):
-        name = f"{what}: things too many, of {counts['things']} seen three times"
+        name = f"{what}: things too many, of {counts['things']} {seen}"
         yield Figure(name=name, value=100 * counts[what] / counts["things"], unit="%")
 
 

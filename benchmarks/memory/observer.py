@@ -12,16 +12,32 @@ from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import Landmark, LaserRing, SemanticMap, Waypoint
 
-__all__ = ["Memory", "observe", "observe_from"]
+__all__ = ["DETECTOR", "NOISY", "Eye", "Memory", "observe", "observe_from"]
 
-BEARING_NOISE_RAD = math.radians(10)
-RANGE_NOISE_RATIO = 0.15
-WRONG_RATIO = 0.2
 NEVER_RATIO = 1 / 3
 N_VIEWS = 3
 NEAREST_M, FARTHEST_M = 1.0, 5.0
 HALF_VIEW_RAD = math.radians(45)
 MOST_TRIES = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Eye:
+    """How an observer errs: as people and models do, where nothing else is said."""
+
+    bearing_noise_rad: float = math.radians(10)
+    range_noise_ratio: float = 0.15
+    wrong_ratio: float = 0.2
+    bearing_from: str | None = None
+
+
+NOISY = Eye()
+DETECTOR = Eye(
+    bearing_noise_rad=math.radians(1),
+    range_noise_ratio=0.03,
+    wrong_ratio=0.0,
+    bearing_from="detector",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +63,7 @@ class _Notebook:
     random: np.random.Generator
     has_ranges: bool
     laser: Laser | None
+    eye: Eye
     n_views: dict[TrueThing, int]
     most_views: int = N_VIEWS
     truth: dict[tuple[str, Landmark], TrueThing] = field(default_factory=dict)
@@ -92,10 +109,10 @@ class _Notebook:
     ) -> tuple[Landmark, bool]:
         label = thing.label
         off_rad = wrap_angle(pose.point.bearing_to(thing.point) - pose.yaw_rad)
-        bearing_rad = off_rad + BEARING_NOISE_RAD * self.random.normal()
+        bearing_rad = off_rad + self.eye.bearing_noise_rad * self.random.normal()
         range_m = pose.point.distance_to(thing.point)
-        range_m *= max(1 + RANGE_NOISE_RATIO * self.random.normal(), 0.1)
-        is_wrong = bool(self.random.random() < WRONG_RATIO)
+        range_m *= max(1 + self.eye.range_noise_ratio * self.random.normal(), 0.1)
+        is_wrong = bool(self.random.random() < self.eye.wrong_ratio)
         if is_wrong and self.random.random() < 0.5:
             others = sorted({other.label for other in self.site.things} - {label})
             label = others[int(self.random.integers(len(others)))]
@@ -105,13 +122,16 @@ class _Notebook:
         landmark = Landmark(
             label=label,
             bearing_rad=float(bearing_rad),
+            bearing_from=self.eye.bearing_from,
             range_m=float(range_m) if self.has_ranges else None,
             laser=None if ring is None else ring.find_fan(pose, float(bearing_rad)),
         )
         return landmark, is_wrong
 
 
-def observe(site: Site, *, seed: int, has_ranges: bool, laser: Laser | None = None) -> Memory:
+def observe(
+    site: Site, *, seed: int, has_ranges: bool, laser: Laser | None = None, eye: Eye = NOISY
+) -> Memory:
     """Write down two things in three, each from three places.
 
     What is seen, and how wrongly, is the same with a laser and without.
@@ -119,7 +139,7 @@ def observe(site: Site, *, seed: int, has_ranges: bool, laser: Laser | None = No
     random = np.random.default_rng(seed)
     order = [site.things[i] for i in random.permutation(len(site.things)).tolist()]
     annotated = order[: round(len(order) * (1 - NEVER_RATIO))]
-    book = _Notebook(site, random, has_ranges, laser, dict.fromkeys(annotated, 0))
+    book = _Notebook(site, random, has_ranges, laser, eye, dict.fromkeys(annotated, 0))
     for thing in annotated:
         for pose in _lookouts(site, thing, random):
             if book.n_views[thing] >= N_VIEWS:
@@ -136,6 +156,7 @@ def observe_from(site: Site, poses: Iterable[Pose], *, seed: int) -> Memory:
         random,
         has_ranges=True,
         laser=None,
+        eye=NOISY,
         n_views=dict.fromkeys(site.things, 0),
         most_views=sys.maxsize,
     )

@@ -132,8 +132,11 @@ def _kinds_of(stems: tuple[str, ...]) -> tuple[ThingKind, ...]:
 @cache
 def _kinds_by_letters() -> MappingProxyType[str, tuple[ThingKind, ...]]:
     kinds: dict[str, dict[ThingKind, None]] = defaultdict(dict)
-    for stems, found in _kinds_by_stems().items():
-        kinds["".join(stems)].update(dict.fromkeys(found))
+    for kind in read_kinds():
+        for name in kind.names:
+            # The stem of "houseplant" is not the stems of "house" and "plant".
+            for stems in (content_stems(name), content_stems(name.replace(" ", ""))):
+                kinds["".join(stems)][kind] = None
     return MappingProxyType({letters: tuple(found) for letters, found in kinds.items()})
 
 

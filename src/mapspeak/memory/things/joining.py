@@ -3,9 +3,8 @@
 Views that speak of no place together are divided first, so that a new view costs what it touches.
 Votes of the others are added up over the map. The place with most votes is a thing; the views that
 it explains better than a thing of their own would are taken out, at most one from each pose, since
-who names two sees two, and none whose range puts it elsewhere. What is left votes again. Then every
-view may change to the thing that explains it best, and things that are better explained as one are
-joined.
+who names two sees two. What is left votes again. Then every view may change to the thing that
+explains it best, and things that are better explained as one are joined.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,7 +14,7 @@ import numpy as np
 
 from mapspeak.memory.merging import SAME_SPOT_M
 from mapspeak.memory.things.labels import name_the_same
-from mapspeak.memory.things.likelihood import NEAR_M, WeighedView, are_apart
+from mapspeak.memory.things.likelihood import NEAR_M, WeighedView
 from mapspeak.memory.things.placing import (
     Posterior,
     build_posterior,
@@ -180,7 +179,6 @@ def _choose(
 def _fits(sighting: WeighedView, members: Iterator[WeighedView]) -> bool:
     return all(
         not _are_of_one_look(sighting.waypoint, other.waypoint)
-        and not are_apart(sighting.spot, other.spot)
         and name_the_same(sighting.landmark.label, other.landmark.label)
         for other in members
     )

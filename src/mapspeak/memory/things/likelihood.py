@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Pose
 from mapspeak.memory.things.labels import hangs_on_walls
 from mapspeak.memory.things.sight import (
     BODY_M,
@@ -14,19 +14,13 @@ from mapspeak.memory.things.sight import (
     SightMap,
     bearing_index,
     correct_by_laser,
+    find_farthest_beside,
     find_log_priors,
     look_around,
 )
 from mapspeak.memory.things.thing import NOISE, Category
 from mapspeak.memory.waypoint import Landmark, Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
-
-N_SIGMAS = 2.5
-"""Of views of one thing, one pair in twenty lies farther apart (chi-squared, two dimensions).
-
-One such pair in twenty splits a thing in two, which makes it ambiguous and so is told; joining two
-things makes one in a wrong place that nothing tells. Hence no wider; narrower splits ever more.
-"""
 
 NEAR_M = 2.0
 """Things whose middles are no farther apart may be one."""
@@ -36,44 +30,6 @@ HANGING_PER_CELL, STANDING_PER_CELL = 0.015, 0.004
 """Things of one name for each lattice cell where such may be: what hangs on walls about once on
 thirteen metres of wall. Chosen in shipped worlds and two drawn ones, by how many views were joined
 to another thing, and how many things were found twice."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RangedSpot:
-    """The end of a line of sight in the map frame, and its covariance in square metres."""
-
-    point: Point
-    xx: float
-    xy: float
-    yy: float
-
-
-def find_spot(pose: Pose, landmark: Landmark) -> RangedSpot | None:
-    """Return where a landmark says that its thing is; None without a direction or a range."""
-    if landmark.bearing_rad is None or landmark.range_m is None:
-        return None
-    way, far_m = pose.yaw_rad + landmark.bearing_rad, landmark.range_m
-    # A range ends at the surface or in the middle of a thing; nobody says which.
-    body = (BODY_M / 2) ** 2
-    along = (NOISE.range_m + NOISE.range_ratio * far_m) ** 2 + body
-    across = (NOISE.bearing_rad_of(landmark) * far_m) ** 2 + body
-    cos, sin = math.cos(way), math.sin(way)
-    return RangedSpot(
-        point=Point(pose.x + far_m * cos, pose.y + far_m * sin),
-        xx=along * cos * cos + across * sin * sin,
-        xy=(along - across) * cos * sin,
-        yy=along * sin * sin + across * cos * cos,
-    )
-
-
-def are_apart(one: RangedSpot | None, other: RangedSpot | None) -> bool:
-    """Return True for two spots so far apart that one thing is hardly in both."""
-    if one is None or other is None:
-        return False
-    dx, dy = one.point.x - other.point.x, one.point.y - other.point.y
-    xx, xy, yy = one.xx + other.xx, one.xy + other.xy, one.yy + other.yy
-    squared = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-    return squared > N_SIGMAS**2
 
 
 _FARTHEST_SIGMAS = 3.5
@@ -132,13 +88,15 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
     down, right = sight.rows[window] - row, sight.cols[window] - col
     ranges_m, angles = np.hypot(down, right) * res_m, np.arctan2(down, right)
     rays = bearing_index(angles)
-    is_near, is_far = ranges_m <= near_m[rays] + BODY_M, ranges_m <= far_m[rays] + BODY_M
+    is_near, is_over = ranges_m <= near_m[rays] + BODY_M, ranges_m <= far_m[rays] + BODY_M
+    is_far = ranges_m <= find_farthest_beside(far_m)[rays] + BODY_M
+    seen_beyond = np.where(is_over, NOISE.seen_over_ratio, NOISE.seen_by_edge_ratio)
     rows, cols = np.nonzero(is_far)
     return Outlook(
         cells=(rows + low[0]) * sight.rows.shape[1] + cols + low[1],
         angles=angles[is_far],
         ranges_m=ranges_m[is_far],
-        sight=np.where(is_near[is_far], 1.0, NOISE.seen_over_ratio),
+        sight=np.where(is_near, 1.0, seen_beyond)[is_far],
         near_m=near_m,
     )
 
@@ -191,7 +149,6 @@ class WeighedView:
         waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
         number: Of the landmark, among those of the standpoint.
         likelihood: Where it may be; None where nothing says.
-        spot: Where its direction and range together say that it is; None without both.
         is_on_wall: Such things hang on walls.
         least_ratio: It speaks of places that it makes so much likelier.
         spoken_of: The cells that it speaks of; where it contradicts the map, all that are near.
@@ -203,7 +160,6 @@ class WeighedView:
     category: Category
     wrong_ratio: float
     likelihood: ViewLikelihood | None
-    spot: RangedSpot | None
     is_on_wall: bool
     least_ratio: float
     spoken_of: IntArray
@@ -270,7 +226,6 @@ def _read(
                     category=category,
                     wrong_ratio=NOISE.wrong_ratio_of(landmark.confidence),
                     likelihood=likelihood,
-                    spot=find_spot(waypoint.pose, landmark),
                     is_on_wall=is_on_wall,
                     least_ratio=least_ratio,
                     spoken_of=_find_spoken_of(sight, likelihood, least_ratio),

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.memory.things.likelihood import N_SIGMAS, ViewLikelihood, WeighedView
+from mapspeak.memory.things.likelihood import ViewLikelihood, WeighedView
 from mapspeak.memory.things.sight import BODY_M, SightMap, find_log_priors
 from mapspeak.memory.things.thing import NOISE
 from mapspeak.spatial.grid import FloatArray, IntArray
 
 _LEAST_WEIGHT = 1e-4
+_N_SIGMAS = 2.5
 _PEAK_M = 0.5
 _MIDDLE_M = 0.75
 _MOST_PEAKS = 25
@@ -104,7 +105,7 @@ def trust_range(sight: SightMap, view: WeighedView, told_m: float) -> Posterior:
     here = sight.grid.fractional_cells_at(np.array([[viewer.x, viewer.y]]))[0]
     far_m = np.hypot(rows - here[0], cols - here[1]) * sight.grid.resolution_m
     sigmas_m = NOISE.range_m + NOISE.range_ratio * far_m
-    is_told = np.abs(far_m - told_m) <= N_SIGMAS * sigmas_m
+    is_told = np.abs(far_m - told_m) <= _N_SIGMAS * sigmas_m
     kept = is_told if is_told.any() else slice(None)
     told = replace(said, cells=said.cells[kept], ratios=said.ratios[kept])
     return build_posterior(sight, [replace(view, likelihood=told, wrong_ratio=0.0)])

@@ -164,7 +164,14 @@ def bearing_index(angles: FloatArray) -> IntArray:
 
 
 _BESIDE = range(-2, 3)
-"""Rays of the map that a beam may be, 1.5 degrees apart: a heading is no better known."""
+"""Rays of the map that a line of sight may be, 1.5 degrees apart: a heading is no better known."""
+
+
+def find_farthest_beside(far_m: FloatArray) -> FloatArray:
+    """Return the farthest of what is met along each ray and those beside it."""
+    return np.asarray(np.max([np.roll(far_m, step) for step in _BESIDE], axis=0))
+
+
 _LEAST_MET = 0.05
 """Cells that a beam hardly ended in are left out."""
 
@@ -252,9 +259,8 @@ def _compare(
     angles = ahead + fan.first_rad + fan.step_rad * np.arange(len(met_m), dtype=np.float64)
     is_end = np.isfinite(met_m)
     end_m = np.where(np.isinf(met_m), fan.reach_m or 0.0, met_m)
-    rays = bearing_index(angles)
     # An edge of what stands there may lie on either side of a beam.
-    beside_m = np.max([near_m[(rays + step) % N_RAYS] for step in _BESIDE], axis=0)
+    beside_m = find_farthest_beside(near_m)[bearing_index(angles)]
     update_m = NOISE.laser_update_m
     is_past = (end_m > beside_m + update_m) & (beside_m < NOISE.reach_m)
     # One beam alone has slipped past a corner or through a gap that the map has closed.

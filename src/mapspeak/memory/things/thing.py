@@ -31,6 +31,7 @@ class NoiseModel:
             fits nothing in sight leaves the direction its say.
         seen_over_ratio: How often one sees over something that stands free, such as a table.
             Counted in drawn buildings, 4 m away at most: 0.89.
+        seen_by_edge_ratio: How often a thing whose middle a corner hides is seen by its edge.
         floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
         reach_m: Nobody names a thing that is farther.
         named_m: At so many metres things are named .61 times as often as near by (a Gaussian).
@@ -52,6 +53,7 @@ class NoiseModel:
     range_ratio: float = 0.15
     wrong_range_ratio: float = 0.02
     seen_over_ratio: float = 0.9
+    seen_by_edge_ratio: float = 0.2
     floor_per_m: float = 0.1
     reach_m: float = 20.0
     named_m: float = 10.0
