@@ -5,6 +5,9 @@ a week later it is looked at three times from where it should show, by looks tha
 view but for one thing in five: once as if it had been taken away, once as it stands there. The
 three looks are from three places, or under one name from one, as a robot writes that comes back.
 As the baseline the same memories are judged as if no look had a time.
+
+Moved: after such looks a thing of the same name is seen from two places where another stood; where
+the first was taken away it is that one, and where the first stands it is a second one.
 """
 
 import math
@@ -41,6 +44,7 @@ MONDAY = datetime(2026, 11, 23, 9, 0, tzinfo=UTC)
 WEEK = timedelta(days=7)
 NOW = MONDAY + WEEK + timedelta(hours=4)
 MOST_TRIES = 80
+NEW_M = 1.5
 RECOLLECTOR = Recollector(lambda: None)
 """Keeps the part of a memory that does not change from case to case."""
 
@@ -61,6 +65,68 @@ def measure() -> Iterable[Figure]:
         state = f"taken away, below {DOUBTED}" if is_taken else f"standing, above {TRUSTED}"
         name = f"three places, no times: {state}, of {len(ours)}"
         yield Figure(name=name, value=100 * sum(is_right) / len(ours), unit="%")
+    yield from _sum_up_moves([case for style in style_names() for case in _play_moves(style)])
+
+
+def _sum_up_moves(cases: Sequence[tuple[bool, bool, bool, bool]]) -> Iterator[Figure]:
+    for is_only in (True, False):
+        for is_taken in (True, False):
+            ours = [case for case in cases if case[:2] == (is_only, is_taken)]
+            kind = "one of its name" if is_only else "one of several of its name"
+            state = "moved" if is_taken else "stands, another is new"
+            for number, what in ((2, "taken for the new one"), (3, "for another one")):
+                name = f"{kind}, {state}: {what}, of {len(ours)}"
+                share = sum(case[number] for case in ours) / max(len(ours), 1)
+                yield Figure(name=name, value=100 * share, unit="%")
+
+
+def _play_moves(style: str) -> Iterator[tuple[bool, bool, bool, bool]]:
+    """Return whether a thing is alone in its name, was taken, and follows to the new or another."""
+    site = Site(parse_world(draw_plan(style, seed=SEED), name=style))
+    memory = observe(site, seed=SEED, has_ranges=True)
+    before = [replace(each, recorded_at=MONDAY) for each in memory.places.waypoints]
+    random = np.random.default_rng(SEED)
+    for thing in memory.annotated:
+        others = [each for each in site.things if each.label != thing.label]
+        there = others[int(random.integers(len(others)))]
+        poses = list(_find_stands(site, thing, random))
+        new_poses = list(_find_stands(site, there, random))[:2]
+        if len(poses) < N_LOOKS or len(new_poses) < 2:
+            continue
+        instead = replace(there, label=thing.label)
+        seen = [_name_one(pose, instead, random, number) for number, pose in enumerate(new_poses)]
+        for is_taken in (True, False):
+            looks = [
+                _look(site, pose, thing, random, is_taken=is_taken, number=number)
+                for number, pose in enumerate(poses)
+            ]
+            world, _ = _recall(site, [*before, *looks, *seen])
+            found = _find(world.things, memory, thing)
+            now = None if found is None else world.follow(found)
+            if found is not None and now is not None:
+                is_new = now.point.distance_to(there.point) <= NEW_M
+                is_only = all(each is thing or each.label != thing.label for each in site.things)
+                yield (
+                    is_only,
+                    is_taken,
+                    now is not found and is_new,
+                    now is not found and not is_new,
+                )
+
+
+def _name_one(pose: Pose, thing: TrueThing, random: np.random.Generator, number: int) -> Waypoint:
+    off_rad = math.remainder(pose.point.bearing_to(thing.point) - pose.yaw_rad, math.tau)
+    landmark = Landmark(
+        label=thing.label,
+        bearing_rad=off_rad + BEARING_NOISE_RAD * random.normal(),
+        range_m=pose.point.distance_to(thing.point),
+    )
+    return Waypoint(
+        name=f"new {number}",
+        pose=pose,
+        functional_landmarks=(landmark,),
+        recorded_at=MONDAY + WEEK + timedelta(hours=3 + number / 2),
+    )
 
 
 def _play(style: str) -> Iterator[tuple[str, bool, float]]:

@@ -128,7 +128,7 @@ def _find_by_id(world: WorldModel, place_id: str) -> Place | None:
         return Place(region.id, region)
     if place_id.startswith("T"):
         remembered = world.recollection.find_thing(place_id)
-        return None if remembered is None else Place(remembered.id, remembered)
+        return None if remembered is None else Place(place_id, world.follow(remembered))
     things: list[Door | Frontier | RememberedPlace] = [
         *world.rooms.doors,
         *world.frontiers.frontiers,

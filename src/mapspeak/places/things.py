@@ -53,6 +53,7 @@ def find_thing(world: WorldModel, words: str) -> Place | None:
         called = list_alike(world, wanted)
     if not called:
         return None
+    called = list(dict.fromkeys(map(world.follow, called)))
     if ordered is not None:
         start = find_named(world, ordered["to"]) if ordered["to"] else None
         if start is not None or not ordered["to"]:

@@ -265,6 +265,13 @@ class WorldModel:
         unseen = self.recollection.unseen
         return Judge(MemoryCheck(self.memory, unseen, distances=distances, rooms=self.rooms))
 
+    def follow(self, remembered: RememberedThing) -> RememberedThing:
+        """Return a thing as it is by now: one that was moved under the id of its new place."""
+        moved = self.judge.find_moved(remembered)
+        if moved is None:
+            return remembered
+        return next(each for each in self.things if each.thing is moved)
+
     def find_approach(self, remembered: RememberedThing) -> Pose | None:
         """Find where the robot stands to face a thing from near; None where it cannot."""
         thing = remembered.thing

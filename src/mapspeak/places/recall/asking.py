@@ -134,8 +134,10 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
         query = replace(query, words=words, room_id=room_id)
     everything: list[Remembered] = [*world.recollection.places, *world.things]
     passing = {each.id: each for each in everything if _passes(world, each, query)}
-    among = frozenset(passing)
-    answer = world.recollection.find(query.words, among=among, limit=max(query.n, MOST_TIED))
+    answer = _find(world, query, passing)
+    if moved := _find_moved(world, answer, passing):
+        passing = {id_: each for id_, each in passing.items() if id_ not in moved}
+        answer = _find(world, query, passing)
     is_tied = 1 < answer.n_meant <= MOST_TIED
     best = _find_best_known(world, answer, passing, query.room_id) if is_tied else None
     if best is not None:
@@ -150,11 +152,26 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
         query=query,
         answer=answer,
         candidates=candidates,
-        n_searched=len(among),
+        n_searched=len(passing),
         elsewhere=find_elsewhere(world.memory, query.words),
         is_empty=not (world.recollection.places or world.things),
         doubt=find_doubt(candidates[0], room_id=query.room_id) if is_found else None,
     )
+
+
+def _find(world: WorldModel, query: RecallQuery, passing: Mapping[str, Remembered]) -> Answer:
+    limit = max(query.n, MOST_TIED)
+    return world.recollection.find(query.words, among=frozenset(passing), limit=limit)
+
+
+def _find_moved(
+    world: WorldModel, answer: Answer, passing: Mapping[str, Remembered]
+) -> frozenset[str]:
+    """Return the ids of what is meant and stands elsewhere by now, under another id that passes."""
+    meant = (passing[each.entry.id] for each in answer.candidates[: answer.n_meant])
+    things = (each for each in meant if isinstance(each, RememberedThing))
+    now = ((each.id, world.follow(each).id) for each in things)
+    return frozenset(old_id for old_id, id_ in now if id_ != old_id and id_ in passing)
 
 
 def _passes(world: WorldModel, remembered: Remembered, query: RecallQuery) -> bool:
