@@ -267,7 +267,7 @@ class WorldModel:
 
     def follow(self, remembered: RememberedThing) -> RememberedThing:
         """Return a thing as it is by now: one that was moved under the id of its new place."""
-        moved = self.judge.find_moved(remembered)
+        moved = self.recollection.unseen.find_moved(remembered.thing)
         if moved is None:
             return remembered
         return next(each for each in self.things if each.thing is moved)

@@ -15,13 +15,13 @@ from weakref import WeakKeyDictionary
 from mapspeak.errors import ConfigError
 from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.consistency.checking import MemoryCheck
-from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, Trust, judge_trust
+from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
 from mapspeak.memory.consistency.unseen import UnseenThings
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
 from mapspeak.memory.things.finding import Things, find_things
-from mapspeak.memory.things.thing import Category, Thing
+from mapspeak.memory.things.thing import Category
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.keptthings import keep_things, load_things
 from mapspeak.worldmodel.remembered import (
@@ -171,12 +171,6 @@ class Judge:
         """Return the trust that a thing deserves at a moment; without one its age is no matter."""
         thing = remembered.thing
         return judge_trust(thing, self._check.find_of_thing(thing), now=now)
-
-    def find_moved(self, remembered: RememberedThing) -> Thing | None:
-        """Return the thing elsewhere that one which is gone is by now; None for all others."""
-        thing = remembered.thing
-        moves = (f for f in self._check.find_of_thing(thing) if f.kind is FindingKind.MOVED)
-        return next((each.things[1] for each in moves if each.things[0] is thing), None)
 
     def judge_place(self, place: RememberedPlace) -> Trust:
         """Return the trust that a record deserves: it is sure until something speaks against it."""

@@ -209,7 +209,8 @@ class MemoryCheck:
             return
         yield from check_rays(found, waypoint)
         if self._rooms is not None:
-            filing, seen = file_of(self._rooms, waypoint), self._unseen.seen_from(waypoint.name)
+            filing = file_of(self._rooms, waypoint)
+            seen = self._unseen.seen_from.get(waypoint.name, ())
             # All records are compared only where this one may be misfiled.
             misfiled = self._misfiled if filing and filing[0].id != filing[1].id else {}
             yield from check_rooms(self._rooms, waypoint, seen, misfiled)

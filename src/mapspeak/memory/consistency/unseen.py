@@ -55,17 +55,28 @@ class UnseenThings:
             self._take_over(earlier)
 
     def _take_over(self, earlier: "UnseenThings") -> None:
-        changed = [each for each in earlier.placed if self.number_of(each) is None]
-        changed += (each for each in self.placed if earlier.number_of(each) is None)
+        new = [each for each in self.placed if earlier.number_of(each) is None]
+        changed = [each for each in earlier.placed if self.number_of(each) is None] + new
         names = {name for thing in changed for name in thing.waypoints}
-        looks, before = self.looks, earlier.looks
+        before = {name: earlier.seen_from.get(name, ()) for name in names}
+        seen_from = {
+            name: [each for each in things if self.number_of(each) is not None]
+            for name, things in before.items()
+        }
+        for thing in new:
+            for name in thing.waypoints:
+                seen_from[name].append(thing)
+        for things in seen_from.values():
+            things.sort(key=lambda each: self._number[id(each)])
+        self.seen_from = earlier.seen_from | seen_from
+        looks, looked = self.looks, earlier.looks
         names.update(
             name
-            for name in looks.keys() | before.keys()
-            if (now := looks.get(name)) is not (then := before.get(name)) and now != then
+            for name in looks.keys() | looked.keys()
+            if (now := looks.get(name)) is not (then := looked.get(name)) and now != then
         )
         is_stale = np.zeros(len(self.placed), dtype=np.bool_)
-        for look in filter(None, (each.get(name) for each in (looks, before) for name in names)):
+        for look in filter(None, (each.get(name) for each in (looks, looked) for name in names)):
             is_stale |= np.hypot(*(self.at - (look.pose.x, look.pose.y)).T) <= NEAR_M
         for known, findings in earlier.known.items():
             number = self._number.get(known)
@@ -75,10 +86,6 @@ class UnseenThings:
     def number_of(self, thing: Thing) -> int | None:
         """Return the number of this very thing among the placed ones; None if it is none."""
         return self._number.get(id(thing))
-
-    def seen_from(self, name: str) -> list[Thing]:
-        """Return the placed things that were seen from the waypoint of a name."""
-        return self._seen_from.get(name, [])
 
     def find_all(self) -> Iterator[MemoryFinding]:
         """Return the findings about all things: for each look in turn, then what was moved."""
@@ -100,18 +107,25 @@ class UnseenThings:
         yield from self._unseen(thing)
         yield from self._moved(thing)
 
+    def find_moved(self, old: Thing) -> Thing | None:
+        """Return what one that is gone is by now: the only thing of its name that is new since."""
+        if self.number_of(old) is None or not self._is_gone(old):
+            return None
+        others = self._find_partners(old)
+        is_it = len(others) == 1 and len(self._find_partners(others[0])) == 1
+        return others[0] if is_it else None
+
     @cached_property
     def _looks_at(self) -> FloatArray:
         return np.array([(each.pose.x, each.pose.y) for each in self._waypoints]).reshape(-1, 2)
 
     @cached_property
-    def _seen_from(self) -> dict[str, list[Thing]]:
+    def seen_from(self) -> dict[str, list[Thing]]:
+        """The placed things that were seen from each waypoint, by its name."""
         seen_from: defaultdict[str, list[Thing]] = defaultdict(list)
         for thing in self.placed:
-            for view in thing.supporting:
-                of_look = seen_from[view.waypoint]
-                if not of_look or of_look[-1] is not thing:
-                    of_look.append(thing)
+            for name in thing.waypoints:
+                seen_from[name].append(thing)
         return seen_from
 
     @cached_property
@@ -194,7 +208,7 @@ class UnseenThings:
         """
         owners = {
             view.landmark: owner
-            for owner in self.seen_from(waypoint.name)
+            for owner in self.seen_from.get(waypoint.name, ())
             for view in owner.supporting
             if view.waypoint == waypoint.name
         }

@@ -42,7 +42,6 @@ from mapspeak.memory.quoting import name_key
 LOCK_TIMEOUT_S = 5.0
 
 _AFTER_FULL_RATIO = 0.9
-_PLAN = "move to "
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _FIRST_FACTS = MappingProxyType({"thinned_hour": "", "left_bytes": "0"})
 

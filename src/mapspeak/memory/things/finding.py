@@ -22,6 +22,7 @@ from mapspeak.memory.things.sight import (
     SightMap,
     bearing_index,
     build_sight_map,
+    find_farthest_beside,
 )
 from mapspeak.memory.things.thing import NOISE, Category, Thing, View
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
@@ -91,7 +92,11 @@ class Things:
         ways = points - (pose.x, pose.y)
         far_m = np.hypot(*ways.T)
         rays = bearing_index(np.arctan2(ways[:, 1], ways[:, 0]) - self.sight.grid.origin.yaw_rad)
-        is_near, is_far = (far_m <= each[rays] + SURFACE_M for each in (seen.near_m, seen.far_m))
+        # A thing is wider than a ray, so that its edge shows where a corner hides its middle.
+        is_near, is_far = (
+            far_m <= find_farthest_beside(each)[rays] + SURFACE_M
+            for each in (seen.near_m, seen.far_m)
+        )
         return np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
 
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
