@@ -53,7 +53,8 @@ def find_thing(world: WorldModel, words: str) -> Place | None:
         called = list_alike(world, wanted)
     if not called:
         return None
-    called = list(dict.fromkeys(map(world.follow, called)))
+    if len(called) <= MOST_NAMED:
+        called = list(dict.fromkeys(map(world.follow, called)))
     if ordered is not None:
         start = find_named(world, ordered["to"]) if ordered["to"] else None
         if start is not None or not ordered["to"]:

@@ -135,7 +135,7 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
     everything: list[Remembered] = [*world.recollection.places, *world.things]
     passing = {each.id: each for each in everything if _passes(world, each, query)}
     answer = _find(world, query, passing)
-    if moved := _find_moved(world, answer, passing):
+    if moved := _find_moved(world, query, answer, passing):
         passing = {id_: each for id_, each in passing.items() if id_ not in moved}
         answer = _find(world, query, passing)
     is_tied = 1 < answer.n_meant <= MOST_TIED
@@ -165,9 +165,12 @@ def _find(world: WorldModel, query: RecallQuery, passing: Mapping[str, Remembere
 
 
 def _find_moved(
-    world: WorldModel, answer: Answer, passing: Mapping[str, Remembered]
+    world: WorldModel, query: RecallQuery, answer: Answer, passing: Mapping[str, Remembered]
 ) -> frozenset[str]:
     """Return the ids of what is meant and stands elsewhere by now, under another id that passes."""
+    if answer.n_meant > query.n:
+        # Of many of a name there are many that each may be, and each costs a judgement.
+        return frozenset()
     meant = (passing[each.entry.id] for each in answer.candidates[: answer.n_meant])
     things = (each for each in meant if isinstance(each, RememberedThing))
     now = ((each.id, world.follow(each).id) for each in things)
