@@ -136,6 +136,20 @@ async def test_another_camera_is_named_and_its_picture_is_remembered_with_its_ow
     assert abs(waypoint.pose.yaw_deg) == pytest.approx(180)
 
 
+async def test_a_later_caption_leaves_out_what_stays_the_same(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.cameras = ("front", "rear")
+    async with connect(robot, tmp_path) as client:
+        first = text_of(await client.call_tool("look_through_camera", {}))
+        again = text_of(await client.call_tool("look_through_camera", {}))
+        behind = text_of(await client.call_tool("look_through_camera", {"camera": "rear"}))
+    assert " px" in first
+    assert " px" not in again
+    assert "Other cameras" not in again
+    assert "taken at x" in again
+    assert " px" in behind
+
+
 def test_the_robot_is_aimed_by_the_camera_ahead_however_wide_another_one_is() -> None:
     book = PictureBook()
     for half_deg, is_ahead in ((40, True), (20, False)):

@@ -176,6 +176,15 @@ def test_a_view_that_points_past_a_thing_in_plain_sight_speaks_against_it() -> N
     assert ghost.conflicting == ()
 
 
+def test_a_view_that_looked_another_way_says_nothing_against_a_thing() -> None:
+    aside = look("d", 3.4, 1.4, ("printer", Point(6.1, 1.4)))
+    turned = replace(aside, pose=Pose(3.4, 1.4, 0.0))
+    (mark,) = aside.functional_landmarks
+    ahead = replace(turned, functional_landmarks=(replace(mark, bearing_rad=0.0),))
+    printer, _other = things_of(*three_looks(), ahead)
+    assert printer.conflicting == ()
+
+
 def test_two_equal_things_seen_from_one_place_stay_two() -> None:
     left, right = Point(1.5, 2.6), Point(4.5, 2.6)
     looks = [

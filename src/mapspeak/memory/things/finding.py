@@ -36,6 +36,8 @@ SURFACE_M = BODY_M + LATTICE_M / math.sqrt(2)
 LIKELY_RATIO = 0.5
 ELSEWHERE_RAD = math.radians(30)
 """A view that points so far past a thing says that it is elsewhere."""
+IN_PICTURE_RAD = math.radians(40)
+"""What is no farther off the heading would be in the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -264,7 +266,7 @@ def _find_against(
 ) -> Iterator[tuple[WeighedView, ...]]:
     """Return for each thing the lone views of its name that point past it.
 
-    Those are meant from where the thing is in plain sight; a thing of one view has none.
+    Those are meant whose picture would show it in plain sight; a thing of one view has none.
     """
     is_lone = [len(each.group) + len(added.get(each, ())) == 1 for each in located]
     alone = [
@@ -289,6 +291,7 @@ def _points_past(
     return (
         all(view.waypoint is not each.waypoint for each in group)
         and _off_rad(view, position) >= ELSEWHERE_RAD
+        and _off_heading_rad(view, position) <= IN_PICTURE_RAD
         and name_the_same(view.landmark.label, group[0].landmark.label)
         and bool(found.find_sight_ratios(view.waypoint, at)[0] > LIKELY_RATIO)
     )
@@ -298,6 +301,11 @@ def _off_rad(sighting: WeighedView, point: Point) -> float:
     pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad or 0.0
     ahead = pose.yaw_rad + bearing_rad
     return abs(math.remainder(pose.point.bearing_to(point) - ahead, math.tau))
+
+
+def _off_heading_rad(view: WeighedView, point: Point) -> float:
+    pose = view.waypoint.pose
+    return abs(math.remainder(pose.point.bearing_to(point) - pose.yaw_rad, math.tau))
 
 
 def _rank(thing: Thing) -> Rank:

@@ -15,6 +15,7 @@ from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
+LEGEND = " (bearing, left positive; range; confidence)"
 Camera = Annotated[str | None, Field(description="by name; else front", max_length=60)]
 
 
@@ -43,14 +44,43 @@ class CameraSighting:
     """A picture of a camera, and its caption.
 
     Attributes:
-        text: Where it was taken, and the reports of the robot's own detector in it.
+        title: Its id, and its camera if that was asked for.
         picture: The picture.
-        detections: The same reports as values; none where the robot has no detector.
+        detector: What reports things in it; None where nothing does.
+        detections: Its reports.
+        remarks: What is doubtful about its pose, and why it was not kept.
     """
 
-    text: str
+    title: str
     picture: CameraPicture
+    detector: str | None
     detections: tuple[Detection, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The whole caption."""
+        return self._say(f"{self.title}: {self.say_size()}, ", LEGEND)
+
+    @property
+    def brief(self) -> str:
+        """The caption for a reader of one of this size by the same camera."""
+        return self._say(f"{self.title}, ", "")
+
+    def say_size(self) -> str:
+        """Say how large and how wide the picture is."""
+        fov_rad = self.picture.horizontal_fov_rad
+        width = "" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
+        return f"{self.picture.width_px} x {self.picture.height_px} px{width}"
+
+    def _say(self, title: str, legend: str) -> str:
+        lines = [f"{title}taken at {say_pose(self.picture.pose)}.", *self.remarks]
+        if self.detector is not None and not self.detections:
+            lines.append(f"The robot's {self.detector} reports nothing.")
+        elif self.detector is not None:
+            lines.append(f"The robot's {self.detector} reports{legend}:")
+            lines += [_say_detection(seen) for seen in self.detections]
+        return "\n".join(lines)
 
     @property
     def image(self) -> Image:
@@ -93,12 +123,14 @@ async def look_ahead(session: Session, camera: str | None = None) -> CameraSight
         is_ahead=is_ahead,
     )
     taken = session.pictures.add(taken, picture.data, media_type=picture.media_type)
-    which = f", camera {name!r}" if camera else ""
-    lines = [_say_picture(f"{taken.id}{which}", picture)]
-    lines += [say_pose_doubt(picture.pose_doubt)] if picture.pose_doubt else []
-    lines += [] if detector is None else _say_detections(detector, detections)
-    lines += [kept.fault] if kept.fault else []
-    return CameraSighting(text="\n".join(lines), picture=picture, detections=detections)
+    doubt = say_pose_doubt(picture.pose_doubt) if picture.pose_doubt else ""
+    return CameraSighting(
+        title=f"Picture {taken.id}" + (f", camera {name!r}" if camera else ""),
+        picture=picture,
+        detector=detector,
+        detections=detections,
+        remarks=tuple(filter(None, (doubt, kept.fault))),
+    )
 
 
 def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:
@@ -113,23 +145,11 @@ def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[P
             )
 
 
-def _say_picture(picture_id: str, picture: CameraPicture) -> str:
-    fov_rad = picture.horizontal_fov_rad
-    width = "" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
+def _say_detection(seen: Detection) -> str:
     return (
-        f"Picture {picture_id}: {picture.width_px} x {picture.height_px} px{width}, "
-        f"taken at {say_pose(picture.pose)}."
-    )
-
-
-def _say_detections(detector: str, detections: tuple[Detection, ...]) -> list[str]:
-    if not detections:
-        return [f"The robot's {detector} reports nothing."]
-    return [f"The robot's {detector} reports (bearing, left positive; range; confidence):"] + [
         f"- {seen.label}, {math.degrees(seen.bearing_rad):+.0f} deg, "
         f"{_say_range(seen.range_m)}, {seen.confidence_ratio:.2f}"
-        for seen in detections
-    ]
+    )
 
 
 def _say_range(range_m: float | None) -> str:

@@ -13,7 +13,6 @@ from mapspeak.server.text.wording import (
     list_some,
     say_area,
     say_compass,
-    say_kind,
     say_obstruction,
     say_path,
     say_point,
@@ -257,7 +256,7 @@ def _place_row(world: WorldModel, place: RememberedPlace) -> Sequence[str]:
 
 
 MOST_STOPS = 15
-COLUMNS = ("id", "kind", "floor m2", "free m2", "size m", "stand at x, y", WAY, "doors")
+COLUMNS = ("id", "floor m2", "free m2", "size m", "stand at x, y", WAY, "doors")
 BENT_RAD = math.radians(45)
 
 
@@ -269,9 +268,10 @@ def room_tables(view: MapView, told: Told) -> str:
             told, heading, COLUMNS, parts, lambda region: _region_row(view.world, region)
         )
 
+    rooms = f"Rooms{_say_open_spaces(view.rooms)}"
     if not told.is_first:
-        return table("Rooms and corridors", view.rooms, view.corridors)
-    rooms = table(f"Rooms{_say_open_spaces(view.rooms)}, smallest first", view.rooms)
+        return table(f"{rooms} and corridors", view.rooms, view.corridors)
+    rooms = table(f"{rooms}, smallest first", view.rooms)
     return f"{rooms}\n\n{table('Corridors, smallest first', view.corridors)}"
 
 
@@ -348,7 +348,6 @@ def _region_row(world: WorldModel, region: Region) -> Sequence[str]:
     doubt = f" ({say_doubtful_door(region, doubtful)})" if doubtful else ""
     return (
         region.id,
-        say_kind(region),
         f"{_say_floor(world, region)}{doubt}",
         f"{region.free_area_m2:.1f}",
         f"{region.length_m:.1f} x {region.width_m:.1f}",

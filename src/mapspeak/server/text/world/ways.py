@@ -20,7 +20,6 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import (
     build_table,
     join_words,
-    say_kind,
     say_obstruction,
     say_path,
     say_point,
@@ -224,11 +223,10 @@ def _size_table(world: WorldModel, regions: Sequence[Region]) -> str:
     least_m2 = by_size[0].floor_area_m2
     table = build_table(
         "Sizes, smallest first",
-        ("id", "kind", "floor m2", "free m2", "times the smallest"),
+        ("id", "floor m2", "free m2", "times the smallest"),
         by_size[:MOST_SIZES],
         lambda region: (
             region.id,
-            say_kind(region),
             f"{region.floor_area_m2:.1f}",
             f"{region.free_area_m2:.1f}",
             f"{region.floor_area_m2 / least_m2:.2f}",
