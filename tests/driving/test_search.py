@@ -123,6 +123,21 @@ async def test_no_place_is_looked_at_twice(tmp_path: Path, flat: World) -> None:
             assert not (is_near and abs(pose.yaw_deg - other.yaw_deg) < 8)
 
 
+async def test_ways_to_what_comes_next_are_told_from_where_the_robot_looks(
+    tmp_path: Path, flat: World
+) -> None:
+    robot = RoamingRobot(flat, has_detector=False)
+    session = session_of(robot, tmp_path)
+    searcher = Searcher(session)
+    told = []
+    for _ in range(5):
+        standing = await _step(robot, searcher, "forklift")
+        world = await session.fetch_world_model()
+        told += [(each.path_m, world.path_m(each.pose.point)) for each in standing.next]
+    assert told
+    assert all(way_m is None or abs(path_m - way_m) < 0.3 for path_m, way_m in told)
+
+
 async def test_a_remembered_place_that_speaks_of_the_thing_comes_first(
     tmp_path: Path, flat: World
 ) -> None:

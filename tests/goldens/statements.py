@@ -22,6 +22,8 @@ ROUNDING = 0.051
 """Of what is told with one digit."""
 NUMBER = r"-?\d+(?:\.\d+)?"
 FREE_BELOW = 50
+CLOSED_MARGIN_M = 0.15
+"""Ways keep this far from a closed area, beside the robot's radius."""
 COARSE_CELLS = 500_000
 """From so many cells on the product measures ways over cells of twice the size."""
 STEPS = tuple((row, col) for row in (-1, 0, 1) for col in (-1, 0, 1) if row or col)
@@ -34,9 +36,11 @@ class Statements:
 
     Args:
         session: Whose map it is.
+        checks: By the names of tools; one tool may have several.
     """
 
     session: Session
+    checks: Sequence[Mapping[str, "Checks"]]
     n_checked: int = 0
     false: list[str] = field(default_factory=list)
     _fields: dict[tuple[int, float, float], Field] = field(default_factory=dict)
@@ -45,14 +49,14 @@ class Statements:
     def check(self, number: int, tool: str, text: str, structured: object) -> None:
         """Check all that an answer states, as far as it can be computed."""
         world = self.session.world
-        checks = CHECKS.get(tool)
-        if world is None or checks is None or text.startswith("! "):
+        if world is None or text.startswith("! "):
             return
         report = structured if isinstance(structured, Mapping) else {}
-        for what, is_true in checks(self, world, text, report):
-            self.n_checked += 1
-            if not is_true:
-                self.false.append(f"[{number}] {tool}: {what}")
+        for check in (each[tool] for each in self.checks if tool in each):
+            for what, is_true in check(self, world, text, report):
+                self.n_checked += 1
+                if not is_true:
+                    self.false.append(f"[{number}] {tool}: {what}")
 
     def say(self) -> list[str]:
         """Return how many statements were checked, and which were false."""
@@ -109,11 +113,14 @@ Fact = tuple[str, bool]
 
 def _relax(world: WorldModel, start: tuple[float, float]) -> Field:
     """Return the cells of way to every cell, by relaxing all cells until none gets nearer."""
-    if world.map.areas:
-        raise LookupError("ways round closed areas")
+    if world.map.hindrances:
+        raise LookupError("ways round what is to be avoided")
     grid = world.grid
     is_open = (grid.cells >= 0) & (grid.cells < FREE_BELOW)
     is_open &= ~_near_walls(grid.cells >= FREE_BELOW, world.radius_m / grid.resolution_m)
+    if world.map.areas:
+        closed_m = world.radius_m + CLOSED_MARGIN_M
+        is_open &= ~_near_walls(_closed_cells(world), closed_m / grid.resolution_m)
     row, col = _cell(world, start)
     if not is_open[row, col]:
         raise LookupError("the robot stands where its map says it cannot")
@@ -128,6 +135,23 @@ def _relax(world: WorldModel, start: tuple[float, float]) -> Field:
         if np.array_equal(nearer, away):
             return away
         away = nearer
+
+
+def _closed_cells(world: WorldModel) -> NDArray[np.bool_]:
+    """Return the cells whose middle lies within an odd number of outlines of an area."""
+    grid = world.grid
+    rows, cols = (each.ravel() for each in np.indices(grid.cells.shape))
+    x, y = grid.points_at(rows, cols).T
+    closed = np.zeros(x.shape, dtype=bool)
+    for area in world.map.areas:
+        inside = np.zeros(x.shape, dtype=bool)
+        for outline in area.outlines:
+            for one, other in pairwise((*outline, outline[0])):
+                crosses = (one.y > y) != (other.y > y)
+                rise = (other.y - one.y) or math.inf
+                inside ^= crosses & (x < one.x + (y - one.y) / rise * (other.x - one.x))
+        closed |= inside
+    return closed.reshape(grid.cells.shape)
 
 
 def _moves_into(is_open: NDArray[np.bool_], down: int, across: int) -> NDArray[np.bool_]:

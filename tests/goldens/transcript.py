@@ -14,7 +14,8 @@ from mcp.client import Client
 from mcp_types import CallToolResult, ImageContent
 from PIL import Image
 
-from goldens.statements import Statements
+from goldens.claims import CLAIMS
+from goldens.statements import CHECKS, Statements
 from guarding import audit_of, make_guard
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Robot
@@ -89,7 +90,7 @@ async def playing(
     session = Session(robot, memory, lease_s=60.0, guard=guard, ros=ros, find_model=lambda: None)
     server = build_server(session, toolsets=toolsets)
     async with Client(server) as client:
-        statements = None if is_paced else Statements(session)
+        statements = None if is_paced else Statements(session, (CHECKS, CLAIMS))
         transcript = Transcript(client, statements, is_paced=is_paced)
         yield transcript
     if statements is not None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -331,15 +331,21 @@ class Searcher:
             n_looks=self._n_looks,
             n_earlier=self._seen.n_earlier,
             driven_m=self._trips.driven_m,
-            here=self._here,
+            here=None if self._here is None else _from_here(world, self._here),
             goal_id=None if trip is None else trip.goal_id,
-            next=self._next,
+            next=tuple(_from_here(world, each) for each in self._next),
             regions=find_seen_regions(world, seen) if self._state.is_end else (),
             seen_ratio=int(np.count_nonzero(seen)) / n_free,
             blocked=tuple(self._trips.blocked),
             pose=world.robot,
             pose_doubt=world.pose_doubt,
         )
+
+
+def _from_here(world: WorldModel, candidate: SearchCandidate) -> SearchCandidate:
+    """Return a place with the way to it from where the robot is now, if there is one."""
+    path_m = world.path_m(candidate.pose.point)
+    return candidate if path_m is None else replace(candidate, path_m=path_m)
 
 
 def _pick_apart(
