@@ -66,3 +66,22 @@ def test_each_trial_of_a_task_has_the_next_seed(tmp_path: Path) -> None:
     )
     trials = plan_run(options, options.load_worlds()).trials
     assert sorted({(trial.number, trial.seed) for trial in trials}) == [(1, 40), (2, 41), (3, 42)]
+
+
+def test_an_agent_that_sees_less_starts_from_its_own_exploration(tmp_path: Path) -> None:
+    options = RunOptions(
+        folder=tmp_path,
+        worlds=("flat_1",),
+        tasks=("fire-tool",),
+        n_trials=1,
+        agents=("scripted", "blind", "bearings", "random"),
+    )
+    worlds = options.load_worlds()
+    jobs = make_jobs(options, plan_run(options, worlds), worlds)
+    began = {job.trial.agent: job.after.agent for job in jobs if job.after is not None}
+    assert began == {
+        "scripted": "scripted",
+        "blind": "blind",
+        "bearings": "bearings",
+        "random": "scripted",
+    }

@@ -13,7 +13,7 @@ NEAR = "The nearest pose that works is x=1.00, y=2.00"
         (
             NextStep.DRIVE_THERE,
             f"{NEAR}.",
-            f"{NEAR}. Call navigate_to with it. look_at_map shows other places.",
+            f"{NEAR}. Call navigate_to with it, or with as_near. look_at_map shows other places.",
         ),
         (
             NextStep.CHOOSE_ON_MAP,

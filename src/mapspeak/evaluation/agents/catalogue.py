@@ -21,7 +21,9 @@ from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.installation import say_install
 
-ORACLE, MOCK, BEARINGS = "oracle", "mock", "bearings"
+ORACLE, MOCK = "oracle", "mock"
+NEAR_SIGHTED, BLIND, BEARINGS = LESS_SIGHTED = ("near-sighted", "blind", "bearings")
+"""Scripts that note less than the script sees: they start from their own memories."""
 COMMAND = "command:"
 NEAR_SIGHT_M = 2.0
 """Range of sight of the near-sighted script; things are visible from three times as far."""
@@ -31,8 +33,8 @@ CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
 """Packages for requests to other providers."""
 SCRIPTS: dict[str, Work] = {
     "scripted": follow_script,
-    "near-sighted": partial(follow_script, sight_m=NEAR_SIGHT_M),
-    "blind": partial(follow_script, sight_m=0.0),
+    NEAR_SIGHTED: partial(follow_script, sight_m=NEAR_SIGHT_M),
+    BLIND: partial(follow_script, sight_m=0.0),
     BEARINGS: partial(follow_script, tells_ranges=False),
     "random": answer_at_random,
     "nearest-frontier": explore_nearest_frontiers,

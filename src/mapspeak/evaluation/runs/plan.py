@@ -10,7 +10,12 @@ import numpy as np
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.catalogue import BEARINGS, can_think, find_versions, read_thinking
+from mapspeak.evaluation.agents.catalogue import (
+    LESS_SIGHTED,
+    can_think,
+    find_versions,
+    read_thinking,
+)
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import EXPLORE, choose_tasks, find_task
 from mapspeak.evaluation.tasks.task import Task
@@ -116,8 +121,8 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
     if not trials:
         asked = ", ".join(task.name for task in tasks)
         raise ConfigError(f"No world has what {asked} asks about.", hint="Choose other worlds.")
-    on_maps = dict.fromkeys(each.world for each in trials if find_task(each.task).needs_map)
-    needed = (prepare_world(options, world) for world in on_maps)
+    on_maps = (each for each in trials if find_task(each.task).needs_map)
+    needed = dict.fromkeys(prepare_world(options, each.world, each.agent) for each in on_maps)
     preparations = tuple(each for each in needed if each not in trials)
     _check_ids((*preparations, *trials))
     versions = {
@@ -145,16 +150,16 @@ def _trials_of(options: RunOptions, task: Task, world: str) -> Iterator[Trial]:
             )
 
 
-def prepare_world(options: RunOptions, world: str) -> Trial:
-    """Return the exploration whose map and memory all trials of a world start from.
+def prepare_world(options: RunOptions, world: str, agent: str) -> Trial:
+    """Return the exploration whose map and memory an agent's trials of a world start from.
 
-    The script does it, unless what is asked for is the memory of the script without ranges.
+    The script does it, but no agent that sees less starts from what the script has seen.
     """
     return Trial(
         task=EXPLORE,
         world=world,
         seed=options.seed,
-        agent=BEARINGS if set(options.agents) == {BEARINGS} else SCRIPTED,
+        agent=agent if agent in LESS_SIGHTED else SCRIPTED,
         representation=PLAIN,
         number=1,
     )

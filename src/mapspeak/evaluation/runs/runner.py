@@ -90,7 +90,7 @@ def make_jobs(
     exploring.sort(key=lambda trial: -_floor_m2(worlds[trial.world]))
     for trial in (*exploring, *(trial for trial in trials if trial.task != EXPLORE)):
         needs_map = find_task(trial.task).needs_map
-        before = prepare_world(options, trial.world) if needs_map else None
+        before = prepare_world(options, trial.world, trial.agent) if needs_map else None
         work = partial(attempt, options.folder, trial, worlds[trial.world], before)
         yield TrialJob(trial=trial, work=work, after=before, silent_s=options.hang_s)
 

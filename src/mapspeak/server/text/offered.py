@@ -47,7 +47,9 @@ def _fill(sentence: str, details: dict[str, object]) -> str:
 
 STEPS = {
     NextStep.CHOOSE_ON_MAP: "{hint}. Call {look_at_map} and choose another one.",
-    NextStep.DRIVE_THERE: "{hint}. Call {navigate_to} with it. {look_at_map} shows other places.",
+    NextStep.DRIVE_THERE: (
+        "{hint}. Call {navigate_to} with it, or with as_near. {look_at_map} shows other places."
+    ),
     NextStep.SEE_PLACES: "{hint}. {look_at_map} shows them.",
     NextStep.MEASURE: "Name another place. {look_at_map} shows them.",
     NextStep.MEASURE_BETWEEN: "Leave one of them out. {measure} tells of the way between.",
@@ -119,8 +121,8 @@ LINES = (
     (
         "Start with {look_at_map}: one call gives the map picture and, as text, the robot's pose, "
         "rooms (R1), corridors (C1), doors (D1), frontiers to the unknown (F1) and remembered "
-        "places (W1), with areas and path distances. The same ids are in picture and text; pick an "
-        "id, never a pixel."
+        "places (W1), with areas and path distances. {look_at_map} has the same ids in picture and "
+        "text: pick an id, never a pixel."
     ),
     (
         "{find_place} finds a remembered place or thing (T1) by name or by what it is for: take it "
@@ -136,8 +138,8 @@ LINES = (
     "{stop_robot} works at any time. {cancel_goal} ends one drive at any time.",
     (
         "{look_through_camera} shows what the robot sees. {look_around} shows a whole room. "
-        "{write_semantic_data} remembers it with the pose. {get_semantic_data} recalls places in "
-        "full."
+        "{write_semantic_data} remembers what is seen, with the pose. {get_semantic_data} recalls "
+        "places in full."
     ),
     (
         "For the robot's ROS start with {ros_overview}. {ros_topics} with ends=true counts who "
