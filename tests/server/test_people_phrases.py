@@ -63,7 +63,7 @@ async def _sizes(client: Client) -> list[str]:
     """Return the ids of the rooms as the table of sizes has them, smallest first."""
     text = text_of(await client.call_tool("measure", {}))
     rows = text.split("## Sizes, smallest first")[1].splitlines()
-    return [row.split(" | ")[0] for row in rows if re.match(r"R\d+ \| room", row)]
+    return [row.split(" | ")[0] for row in rows if re.match(r"R\d+ \| \d", row)]
 
 
 async def _ways(client: Client, places: list[str]) -> list[str]:
