@@ -20,9 +20,7 @@ CODED = re.compile(r"\bshowing (\d+) (?:to (\d+) )?of (\d+)")
 PERCENT = re.compile(rf"^Explored: ({NUMBER}) of about ({NUMBER}) m2 of free floor, (\d+) %")
 
 
-def check_place(
-    told: Statements, world: WorldModel, _text: str, report: Report
-) -> Iterator[Fact]:
+def check_place(told: Statements, world: WorldModel, _text: str, report: Report) -> Iterator[Fact]:
     """Check what a phrase was taken for: the smallest, the nearest, the farthest."""
     said = str(report.get("reason", "")) or str(report.get("place", ""))
     found = TITLE.search(said)
@@ -111,7 +109,9 @@ def check_found(told: Statements, world: WorldModel, text: str, report: Report) 
 
 
 def _check_nearest_found(text: str, candidates: Sequence[Report]) -> Iterator[Fact]:
-    found = re.search(r"(\w+) (?:\"[^\"]*\" )?\(?(?:is |, )?(?:of (\d+) )?the nearest by path", text)
+    found = re.search(
+        r"(\w+) (?:\"[^\"]*\" )?\(?(?:is |, )?(?:of (\d+) )?the nearest by path", text
+    )
     ways = {each["id"]: each["path_m"] for each in candidates if each["path_m"] is not None}
     if found and found[1] in ways:
         alike = [each for each in candidates if each["score"] >= candidates[0]["score"] - 1e-6]
@@ -136,7 +136,10 @@ def check_blocked(
             metres = told.way_m(world, here, (pose.x, pose.y))
         except LookupError:
             return
-        yield f"{place.id} has a way, or is named", is_cut or (metres is None) == (place.id in named)
+        yield (
+            f"{place.id} has a way, or is named",
+            is_cut or (metres is None) == (place.id in named),
+        )
     for region in world.rooms.regions:
         if region.id in named:
             continue
@@ -159,14 +162,13 @@ def check_memory_size(
     yield f"{report['n_places']} places, not {len(known)}", report["n_places"] == len(known)
     for each in report.get("waypoints", ()):
         at, told_at = known[each["id"]].pose, each["pose"]
-        yield f"{each['id']} stands where it says", math.dist(
-            (at.x, at.y), (told_at["x"], told_at["y"])
-        ) <= 0.01
+        yield (
+            f"{each['id']} stands where it says",
+            math.dist((at.x, at.y), (told_at["x"], told_at["y"])) <= 0.01,
+        )
 
 
-def check_search(
-    told: Statements, world: WorldModel, _text: str, report: Report
-) -> Iterator[Fact]:
+def check_search(told: Statements, world: WorldModel, _text: str, report: Report) -> Iterator[Fact]:
     """Check how far from the robot each place is that it could look at next."""
     here = (world.robot.x, world.robot.y)
     for line in (*report["next"], report["looks_at"]):
@@ -189,8 +191,9 @@ def check_route(
     """Check that a route's metres add up, and that every stop is counted once."""
     if report["total_m"] is not None:
         total_m = sum(report["legs_m"])
-        yield f"{report['total_m']} m in all", abs(report["total_m"] - total_m) <= 0.06 * (
-            1 + len(report["legs_m"])
+        yield (
+            f"{report['total_m']} m in all",
+            abs(report["total_m"] - total_m) <= 0.06 * (1 + len(report["legs_m"])),
         )
     stops = [*report["done"], *report["skipped"], report["next"], *report["remaining"]]
     n_stops = len([each for each in stops if each])
@@ -216,7 +219,10 @@ def check_counts(
         yield f"{share[3]} % explored, not {percent:.1f}", abs(int(share[3]) - percent) <= 1.0
     reachable = re.search(r"^Of those with a way for the robot the smallest is (\w+) ", text)
     if reachable:
-        yield f"{reachable[1]} is there", any(each.id == reachable[1] for each in world.rooms.regions)
+        yield (
+            f"{reachable[1]} is there",
+            any(each.id == reachable[1] for each in world.rooms.regions),
+        )
 
 
 CLAIMS: Mapping[str, Checks] = {
