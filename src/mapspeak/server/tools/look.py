@@ -16,7 +16,7 @@ from mapspeak.server.text.world.drives import say_on_the_way
 from mapspeak.server.text.world.look import Layer, MapLook, MapView, Up, look_at, view_of
 from mapspeak.server.text.world.tables import list_subjects
 from mapspeak.server.text.world.told import Told
-from mapspeak.server.tools.asking import find_reader
+from mapspeak.server.tools.caller import find_reader
 from mapspeak.server.tools.sightings import Camera, CameraSighting, look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
