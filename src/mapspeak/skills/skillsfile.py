@@ -304,6 +304,22 @@ def _write(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
         unfinished.write_text(text.getvalue(), encoding="utf-8")
         unfinished.replace(path)
     except OSError as error:
-        raise ConfigError(
-            f"{path} could not be written: {say_cause(error)}.", hint="Check disk and permissions."
-        ) from error
+        raise _not_written(path, error) from error
+
+
+def set_aside(path: Path) -> Path:
+    """Rename a saved mission's file, so that it is read no more; return what it is called now.
+
+    Raises:
+        ConfigError: The file cannot be renamed.
+    """
+    try:
+        return path.replace(path.with_name(f"{path.name}.forgotten"))
+    except OSError as error:
+        raise _not_written(path, error) from error
+
+
+def _not_written(path: Path, error: OSError) -> ConfigError:
+    return ConfigError(
+        f"{path} could not be written: {say_cause(error)}.", hint="Check disk and permissions."
+    )

@@ -453,6 +453,17 @@ async def test_a_saved_mission_is_a_skill_with_parameters_and_keeps_corrections(
     assert "'drive' is taken" in taken
 
 
+async def test_a_mission_whose_file_cannot_be_set_aside_stays(tmp_path: Path) -> None:
+    async with missions(tmp_path) as caller:
+        saved = await caller.ask("save_mission", name="visit", tree="- look\n")
+        path = Path(saved.splitlines()[0].removeprefix("Saved visit in ").removesuffix("."))
+        path.with_name(f"{path.name}.forgotten").mkdir()
+        told = await caller.refuse("forget_mission", name="visit")
+        kept = await caller.ask("show_missions", name="visit")
+    assert "could not be written" in told
+    assert "look" in kept
+
+
 async def test_a_parameter_of_a_saved_mission_is_a_number_where_a_step_wants_one(
     tmp_path: Path,
 ) -> None:

@@ -72,7 +72,9 @@ NPictures = Annotated[
         strict=True,
     ),
 ]
-AsNear = Annotated[bool, Field(description="else drive to that")]
+AsNear = Annotated[
+    bool, Field(description="where it does not work, drive to the nearest that does")
+]
 GoalId = Annotated[str | None, Field(description="e.g. G1; else the latest")]
 
 

@@ -28,6 +28,7 @@ from mapspeak.skills.skillsfile import (
     USUAL_MISSION_MIN,
     OwnersEntry,
     add_correction,
+    set_aside,
     write_mission,
 )
 from mapspeak.skills.treereading import parse_tree
@@ -182,10 +183,9 @@ class MissionTools:
     async def forget_mission(self, name: Name) -> str:
         """Forget a saved mission; its file is kept beside as NAME.yaml.forgotten."""
         path = self._find_saved(name).path
-        if path is not None:
-            path.replace(path.with_name(f"{path.name}.forgotten"))
+        aside = None if path is None else set_aside(path)
         self._book.load_saved()
-        return f"{name} is forgotten; its file is kept as {path}.forgotten."
+        return f"{name} is forgotten; its file is kept as {aside}."
 
     def _find_saved(self, name: str) -> Mission:
         self._book.load_saved()
