@@ -100,14 +100,15 @@ async def test_services_of_custom_types_are_typed_tools_where_rosapi_tells_them(
         tools_of(url, tmp_path, "/robot_skills/*", "/battery_state") as caller,
     ):
         tools = await caller.until(lambda tools: "robot_skills_speak" in tools)
-        refused = await caller.refuse("robot_skills_speak", text=7)
+        refused = await caller.refuse("robot_skills_speak", text=["Hello"])
         await caller.ask("robot_skills_speak", text="Hello")
+        await caller.ask("robot_skills_speak", text=7)
         failed = await caller.ask("robot_skills_dock", until_percent=50.0)
     properties = tools["robot_skills_speak"].input_schema["properties"]
     assert properties["text"]["type"] == "string"
-    assert "text cannot be 7" in refused
+    assert "text cannot be ['Hello']" in refused
     assert "No dock answers within 2.5 m." in failed
-    assert StateRecord.of(simulation).deeds == ("speak: Hello",)
+    assert StateRecord.of(simulation).deeds == ("speak: Hello", "speak: 7")
 
 
 SPEAK = """skills:
