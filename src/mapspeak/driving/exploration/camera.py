@@ -27,6 +27,7 @@ from mapspeak.places.standing import spread_places
 from mapspeak.robot import GoalState
 from mapspeak.safety import ApprovalScope
 from mapspeak.spatial.fieldofview import (
+    N_HEADINGS,
     CameraView,
     find_half_view_rad,
     heading_rad,
@@ -36,7 +37,7 @@ from mapspeak.spatial.fieldofview import (
     sum_by_heading,
 )
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 1.0
@@ -49,6 +50,8 @@ NEAR_FIRST = 1.5
 """Above 1, what is near comes before what shows more: it would else be returned to."""
 DETOUR_M = 2.0
 """What is farther off the way to a frontier waits until later."""
+SAME_SPOT_M = 0.25
+"""Pictures taken as near to each other as this, the same way, show the same walls."""
 APART_M = 1.0
 APART_RAD = math.radians(25.0)
 
@@ -81,7 +84,7 @@ def find_camera_target(
     shown = mask_pictured(world.grid, views)
     half_rad = find_half_view_rad(views)
     here = world.robot.point
-    around_m = new_wall_by_heading(world.grid, shown, np.array([[here.x, here.y]]))[0]
+    (around_m,) = _new_wall_from(world, shown, np.array([[here.x, here.y]]), views)
     if sum_by_heading(around_m, half_rad).max() >= TURN_WORTH_M and not is_closed(here):
         return _target(here, around_m, half_rad)
     points, ways_m = spread_places(world)
@@ -92,7 +95,7 @@ def find_camera_target(
         ways_m = np.maximum(ways_m + on_m - frontier.distance_m, 0.0)
         is_beside = ways_m <= DETOUR_M
         points, ways_m = points[is_beside], ways_m[is_beside]
-    new_m = new_wall_by_heading(world.grid, shown, points)
+    new_m = _new_wall_from(world, shown, points, views)
     total_m = new_m.sum(axis=1)
     rates = np.where(total_m >= DRIVE_WORTH_M, total_m / (ways_m + STOP_M) ** NEAR_FIRST, 0.0)
     for index in np.argsort(-rates, kind="stable")[: np.count_nonzero(rates)]:
@@ -100,6 +103,23 @@ def find_camera_target(
         if not is_closed(point):
             return _target(point, new_m[index], half_rad)
     return None
+
+
+def _new_wall_from(
+    world: WorldModel, shown: Mask, points: FloatArray, views: Sequence[CameraView]
+) -> FloatArray:
+    """Return how much new wall lies in each heading from places, shape (n, N_HEADINGS), in metres.
+
+    What a picture from the same spot had in it is not new. Rays along a wall end at other cells
+    from a step aside, and the robot would look at it from there again and again.
+    """
+    new_m = new_wall_by_heading(world.grid, shown, points)
+    headings_rad = [heading_rad(index) for index in range(N_HEADINGS)]
+    for view in views:
+        is_here = np.hypot(*(points - [view.pose.x, view.pose.y]).T) <= SAME_SPOT_M
+        turns_rad = [abs(wrap_angle(each - view.pose.yaw_rad)) for each in headings_rad]
+        new_m[np.ix_(is_here, np.array(turns_rad) <= view.half_view_rad)] = 0.0
+    return new_m
 
 
 def measure_pictured_on(world: WorldModel, views: Sequence[CameraView]) -> float:

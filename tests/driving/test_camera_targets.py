@@ -1,0 +1,46 @@
+"""Where to stop for pictures: each spot shows what it can once."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mapspeak.driving.exploration.camera import find_camera_target
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.memory import SemanticMap
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.fieldofview import CameraView
+from mapspeak.worldmodel.model import WorldModel
+
+HALF_VIEW_RAD = math.radians(42.5)
+MOST_STOPS = 40
+
+
+def rough_corridor(seed: int) -> OccupancyGrid:
+    """Draw a corridor of 19.5 m between walls as a laser draws them, a cell to and fro."""
+    random_ = np.random.default_rng(seed)
+    cells = np.full((50, 400), 100, dtype=np.int8)
+    for col, (low, high) in enumerate(random_.integers(0, 2, (390, 2)).tolist(), start=5):
+        cells[10 + low : 40 - high, col] = 0
+    return OccupancyGrid(cells=cells, resolution_m=0.05, origin=Pose(0.013, 0.027, 0.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_spot_is_looked_at_from_twice_the_same_way(seed: int) -> None:
+    grid, off = rough_corridor(seed), np.random.default_rng(seed)
+    robot, views = Pose(3.5, 1.25, 0.0), list[CameraView]()
+    for _ in range(MOST_STOPS):
+        world = WorldModel(grid, robot, SemanticMap(), radius_m=0.2)
+        target = find_camera_target(world, views, None, is_closed=lambda _: False)
+        if target is None:
+            break
+        x, y, yaw_rad = target.pose.x, target.pose.y, target.pose.yaw_rad
+        for view in views:
+            is_near = view.pose.point.distance_to(target.pose.point) < 0.1
+            assert not (is_near and abs(wrap_angle(yaw_rad - view.pose.yaw_rad)) < 0.2)
+        # A robot arrives as well as it can.
+        dx, dy, turn_rad = off.uniform(-0.03, 0.03, 3).tolist()
+        robot = Pose(x + dx, y + dy, yaw_rad + turn_rad)
+        views.append(CameraView(robot, HALF_VIEW_RAD))
+    else:
+        pytest.fail("there is always another stop")
