@@ -27,7 +27,6 @@ from mapspeak.places.standing import spread_places
 from mapspeak.robot import GoalState
 from mapspeak.safety import ApprovalScope
 from mapspeak.spatial.fieldofview import (
-    N_HEADINGS,
     CameraView,
     find_half_view_rad,
     heading_rad,
@@ -37,7 +36,7 @@ from mapspeak.spatial.fieldofview import (
     sum_by_heading,
 )
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 1.0
@@ -50,8 +49,9 @@ NEAR_FIRST = 1.5
 """Above 1, what is near comes before what shows more: it would else be returned to."""
 DETOUR_M = 2.0
 """What is farther off the way to a frontier waits until later."""
-SAME_SPOT_M = 0.25
-"""Pictures taken as near to each other as this, the same way, show the same walls."""
+SAME_SPOT_M = 0.15
+SAME_WAY_RAD = math.radians(12.0)
+"""A picture taken so near to another shows no more, whatever single rays meet."""
 APART_M = 1.0
 APART_RAD = math.radians(25.0)
 
@@ -84,9 +84,11 @@ def find_camera_target(
     shown = mask_pictured(world.grid, views)
     half_rad = find_half_view_rad(views)
     here = world.robot.point
-    (around_m,) = _new_wall_from(world, shown, np.array([[here.x, here.y]]), views)
+    around_m = new_wall_by_heading(world.grid, shown, np.array([[here.x, here.y]]))[0]
     if sum_by_heading(around_m, half_rad).max() >= TURN_WORTH_M and not is_closed(here):
-        return _target(here, around_m, half_rad)
+        target = _target(here, around_m, half_rad)
+        if not _is_taken(target.pose, views):
+            return target
     points, ways_m = spread_places(world)
     if frontier is not None:
         # What lies on the way to the frontier, or hardly beside it.
@@ -95,31 +97,24 @@ def find_camera_target(
         ways_m = np.maximum(ways_m + on_m - frontier.distance_m, 0.0)
         is_beside = ways_m <= DETOUR_M
         points, ways_m = points[is_beside], ways_m[is_beside]
-    new_m = _new_wall_from(world, shown, points, views)
+    new_m = new_wall_by_heading(world.grid, shown, points)
     total_m = new_m.sum(axis=1)
     rates = np.where(total_m >= DRIVE_WORTH_M, total_m / (ways_m + STOP_M) ** NEAR_FIRST, 0.0)
     for index in np.argsort(-rates, kind="stable")[: np.count_nonzero(rates)]:
         point = Point(*points[index].tolist())
-        if not is_closed(point):
-            return _target(point, new_m[index], half_rad)
+        target = _target(point, new_m[index], half_rad)
+        if not is_closed(point) and not _is_taken(target.pose, views):
+            return target
     return None
 
 
-def _new_wall_from(
-    world: WorldModel, shown: Mask, points: FloatArray, views: Sequence[CameraView]
-) -> FloatArray:
-    """Return how much new wall lies in each heading from places, shape (n, N_HEADINGS), in metres.
-
-    What a picture from the same spot had in it is not new. Rays along a wall end at other cells
-    from a step aside, and the robot would look at it from there again and again.
-    """
-    new_m = new_wall_by_heading(world.grid, shown, points)
-    headings_rad = [heading_rad(index) for index in range(N_HEADINGS)]
-    for view in views:
-        is_here = np.hypot(*(points - [view.pose.x, view.pose.y]).T) <= SAME_SPOT_M
-        turns_rad = [abs(wrap_angle(each - view.pose.yaw_rad)) for each in headings_rad]
-        new_m[np.ix_(is_here, np.array(turns_rad) <= view.half_view_rad)] = 0.0
-    return new_m
+def _is_taken(pose: Pose, views: Sequence[CameraView]) -> bool:
+    """Return True where a picture was taken already: it would be taken again without end."""
+    return any(
+        view.pose.point.distance_to(pose.point) <= SAME_SPOT_M
+        and abs(wrap_angle(view.pose.yaw_rad - pose.yaw_rad)) <= SAME_WAY_RAD
+        for view in views
+    )
 
 
 def measure_pictured_on(world: WorldModel, views: Sequence[CameraView]) -> float:
