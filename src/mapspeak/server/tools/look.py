@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from mcp.server.mcpserver import Context, Image
@@ -36,6 +37,19 @@ MOST_READERS = 50
 """Of more sessions the one that looked longest ago is told everything again."""
 
 
+@dataclass(slots=True)
+class _Reader:
+    """One reader of answers.
+
+    Attributes:
+        told: What the last look at the map told it; None before the first.
+        captions: By camera and size, the pictures whose whole captions it has read.
+    """
+
+    told: Mapping[str, str] | None = None
+    captions: set[tuple[str | None, str]] = field(default_factory=set)
+
+
 class LookTools:
     """Looking at the map, through the camera, at the pose.
 
@@ -49,8 +63,7 @@ class LookTools:
     ) -> None:
         self._session = session
         self._representation = representation
-        self._told: dict[str, Mapping[str, str]] = {}
-        self._captions: set[tuple[str, str | None, str]] = set()
+        self._readers: dict[str, _Reader] = {}
 
     @tool("Look at the map", ToolEffect.READS, is_entry=True)
     async def look_at_map(
@@ -79,14 +92,11 @@ class LookTools:
             return view_of(world, look, taken, navigation)
 
         view = await self._session.compute(see)
-        client = find_reader(context) if view.look == MapLook() else None
-        told = Told(None if full or client is None else self._told.get(client))
+        reader = self._find_reader(context) if view.look == MapLook() else None
+        told = Told(None if full or reader is None else reader.told)
         shown = await self._session.compute(lambda: show(view, self._representation, told))
-        if client is not None:
-            self._told.pop(client, None)
-            self._told[client] = told.keep(list_subjects(world))
-            for oldest in list(self._told)[:-MOST_READERS]:
-                del self._told[oldest]
+        if reader is not None:
+            reader.told = told.keep(list_subjects(world))
         pictures = [] if shown.png is None else [Image(data=shown.png, format="png")]
         warning = await say_moved(self._session.compute(self._session.keeper.compare))
         text = f"Warning: {warning}\n{shown.text}" if warning else shown.text
@@ -108,17 +118,29 @@ class LookTools:
         """
         sighting = await look_ahead(self._session, camera)
         under_way = await self._find_drive()
-        said = [self._say_caption(sighting, find_reader(context), camera)]
+        said = [self._say_caption(sighting, self._find_reader(context), camera)]
         said += [] if under_way is None else [say_on_the_way(under_way)]
         return ["\n".join(said), sighting.image]
 
-    def _say_caption(self, sighting: CameraSighting, reader: str | None, camera: str | None) -> str:
+    def _find_reader(self, context: Context) -> "_Reader | None":
+        """Return what the reader of an answer knows; None where that is unknown."""
+        name = find_reader(context)
+        if name is None:
+            return None
+        self._readers[name] = reader = self._readers.pop(name, None) or _Reader()
+        for oldest in list(self._readers)[:-MOST_READERS]:
+            del self._readers[oldest]
+        return reader
+
+    def _say_caption(
+        self, sighting: CameraSighting, reader: "_Reader | None", camera: str | None
+    ) -> str:
         """Say what a reader does not know from pictures before; all where it is unknown."""
         if reader is not None:
-            known = (reader, camera, sighting.say_size())
-            if known in self._captions:
+            known = (camera, sighting.say_size())
+            if known in reader.captions:
                 return sighting.brief
-            self._captions.add(known)
+            reader.captions.add(known)
         others = "" if camera else ", ".join(self._session.robot.description.cameras[1:])
         return f"{sighting.text}\nOther cameras: {others}." if others else sighting.text
 
