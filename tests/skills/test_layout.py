@@ -112,6 +112,7 @@ def test_what_a_definition_says_of_a_field_is_quoted_and_cut() -> None:
         ({"reach_mode": 1.5}, "reach_mode cannot be 1.5"),
         ({"force": "much"}, "force cannot be 'much'"),
         ({"force": float("nan")}, "force cannot be nan"),
+        ({"picture": 7}, "picture cannot be 7"),
         ({"picture": "A" * 200_000}, "at most 100000 letters"),
     ],
 )

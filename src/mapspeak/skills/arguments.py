@@ -53,7 +53,7 @@ def check_arguments(
 
 
 def check_value(parameter: SkillParameter, value: JsonValue, *, where: str, what: str) -> JsonValue:
-    """Return one argument as its parameter holds it; a number may be written as a text.
+    """Return one argument as its parameter holds it: "3" for a number, 3 for a text too.
 
     Args:
         where: The name of the argument, or the path to a part of it.
@@ -66,9 +66,11 @@ def check_value(parameter: SkillParameter, value: JsonValue, *, where: str, what
     match parameter.kind:
         case ParameterKind.NUMBER | ParameterKind.WHOLE:
             fitting = _number(parameter, value)
-        case ParameterKind.TEXT | ParameterKind.BYTES if isinstance(value, str | int | float):
+        case ParameterKind.TEXT if isinstance(value, str | int | float):
             text = plain(value)
             fitting = text if _is_within(parameter, len(text)) else None
+        case ParameterKind.BYTES if isinstance(value, str):
+            fitting = value if _is_within(parameter, len(value)) else None
         case ParameterKind.FLAG:
             fitting = FLAGS.get(plain(value))
         case ParameterKind.LIST if isinstance(value, list | tuple):
