@@ -26,6 +26,11 @@ STEP_M = 0.05
 """A pose that has moved less may only have wavered."""
 STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
 WAITS = GoalStatus(state=GoalState.PLANNED, cause=Cause(code=CauseCode.WAITING))
+NEWS_S = 0.5
+"""Wall time from the robot's return until its navigation has told how goals stand."""
+NEEDS_NO_STOP = (GoalState.ARRIVED, GoalState.CANCELLED, GoalState.PREEMPTED)
+"""Navigation has ended these itself; what a newer goal has replaced, that drives on with."""
+logger = logging.getLogger(__name__)
 
 
 class Odometer:
@@ -210,14 +215,6 @@ class DriveMonitor:
 def _has_moved(one: Pose, other: Pose) -> bool:
     turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
     return one.point.distance_to(other.point) > MOVED_M or turned_rad > TURNED_RAD
-
-
-NEWS_S = 0.5
-"""Wall time from the robot's return until its navigation has told how goals stand."""
-NEEDS_NO_STOP = (GoalState.ARRIVED, GoalState.CANCELLED, GoalState.PREEMPTED)
-"""Navigation has ended these itself; what a newer goal has replaced, that drives on with."""
-
-logger = logging.getLogger(__name__)
 
 
 class OwedStop:

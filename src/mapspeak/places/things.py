@@ -33,6 +33,8 @@ ORDERED = re.compile(
 THING_ID = re.compile(r"[Tt]\d+")
 ARTICLE = re.compile(r"(?:the|an?|any|some)\s+", re.IGNORECASE)
 IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNORECASE | re.DOTALL)
+AROUND_M = 5.0
+"""Largest distance from the robot to a thing that a person says is gone."""
 
 
 def find_thing(world: WorldModel, words: str) -> Place | None:
@@ -189,10 +191,6 @@ def _say_candidates(world: WorldModel, called: Sequence[RememberedThing]) -> str
         told.append(f"{each.id} in {rooms}, {'no way' if path_m is None else f'{path_m:.1f} m'}")
     n_more = len(called) - len(told)
     return ", ".join(told) + (f" and {n_more} more" if n_more else "")
-
-
-AROUND_M = 5.0
-"""Largest distance from the robot to a thing that a person says is gone."""
 
 
 def forget(world: WorldModel, store: MemoryStore, words: str) -> Forgotten:

@@ -14,6 +14,9 @@ from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.worldmodel.revision import MapRevision
 
+SAME_GAP_M = 0.5
+MOST_GAPS = 30
+
 
 def has_room_at(grid: OccupancyGrid, point: Point, *, radius_m: float) -> bool:
     """Return True where a robot of that radius can stand on known floor."""
@@ -130,10 +133,6 @@ def _kinds_at(grid: OccupancyGrid, points: FloatArray) -> IntArray:
     """Return what the map shows at points: 1 free, 0 occupied, -1 unknown."""
     free = grid.look_up(grid.free, points, outside=False).astype(np.intp)
     return free - grid.look_up(grid.unknown, points, outside=True)
-
-
-SAME_GAP_M = 0.5
-MOST_GAPS = 30
 
 
 class FrontierTries:

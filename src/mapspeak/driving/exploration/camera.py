@@ -54,6 +54,11 @@ SAME_WAY_RAD = math.radians(12.0)
 """A picture taken so near to another shows no more, whatever single rays meet."""
 APART_M = 1.0
 APART_RAD = math.radians(25.0)
+TURN_S = 10.0
+"""Robot time that a turn on arrival may take."""
+MOST_DRIVES = 4
+"""To the goal, to where it fits after more of it is mapped, and the turn."""
+SCOPE_S = 600.0
 
 
 def is_view_due(robot: Pose, views: Sequence[CameraView]) -> bool:
@@ -126,13 +131,6 @@ def measure_pictured_on(world: WorldModel, views: Sequence[CameraView]) -> float
 def _target(point: Point, by_heading_m: FloatArray, half_rad: float) -> Target:
     yaw_rad = heading_rad(int(sum_by_heading(by_heading_m, half_rad).argmax()))
     return Target(id=f"({point.x:.1f}, {point.y:.1f})", pose=Pose(point.x, point.y, yaw_rad))
-
-
-TURN_S = 10.0
-"""Robot time that a turn on arrival may take."""
-MOST_DRIVES = 4
-"""To the goal, to where it fits after more of it is mapped, and the turn."""
-SCOPE_S = 600.0
 
 
 class PictureContext(TripContext, Protocol):

@@ -26,6 +26,16 @@ TEXTS = ("string", "wstring")
 TIMES = {"time": "uint32 secs\nuint32 nsecs", "duration": "int32 secs\nint32 nsecs"}
 """Primitive types of ROS 1 that have no message, as the text that one would have."""
 PLAIN = frozenset((*FLOATS, *WHOLES, *TEXTS, *TIMES, "bool"))
+SIZES = {
+    "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2,
+    "int32": 4, "uint32": 4, "float32": 4, "int64": 8, "uint64": 8, "float64": 8,
+    "time": 8, "duration": 8,
+}  # fmt: skip
+COUNT = 4
+"""Bytes of a number before each text and each list without fixed length."""
+OF_ACTION = ("Goal", "Result", "Feedback", "FeedbackMessage")
+OF_SERVICE = ("Request", "Response")
+OF_ACTIONS_SERVICE = ("SendGoal", "GetResult")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,15 +239,6 @@ def _number(text: str, read: Callable[[str], float]) -> float:
         return read("0")
 
 
-SIZES = {
-    "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2,
-    "int32": 4, "uint32": 4, "float32": 4, "int64": 8, "uint64": 8, "float64": 8,
-    "time": 8, "duration": 8,
-}  # fmt: skip
-COUNT = 4
-"""Bytes of a number before each text and each list without fixed length."""
-
-
 def measure_message(book: TypeBook, type_name: str, message: Message) -> int:
     """Return the bytes of a message, without the padding of CDR (at most 7 for each value).
 
@@ -271,9 +272,6 @@ def _measure_value(book: TypeBook, field: Field, value: object) -> int:
 
 NOTHING = Field(name="structure_needs_at_least_one_member", type="uint8")
 """The field that ROS 2 puts in a message without fields."""
-OF_ACTION = ("Goal", "Result", "Feedback", "FeedbackMessage")
-OF_SERVICE = ("Request", "Response")
-OF_ACTIONS_SERVICE = ("SendGoal", "GetResult")
 
 
 def name_in_ros2(name: str) -> str:

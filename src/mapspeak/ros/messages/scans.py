@@ -32,6 +32,11 @@ SAYING_NOTHING: dict[str, Any] = {
     "range_max": sys.float_info.max,
 }
 """The values that replace impossible ones in a scan's fields."""
+HINT = "Look at the fields of the message; the node that sends it may be misconfigured."
+KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""By sensor_msgs/PointField, numpy's names."""
+LARGEST_STEP = 65_536
+MOST_POINTS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -191,13 +196,6 @@ def _fov(width_px: int, *, focal_px: float, centre_px: float) -> float | None:
         return None
     fov_rad = math.atan(centre_px / focal_px) + math.atan((width_px - centre_px) / focal_px)
     return fov_rad if 0.0 < fov_rad < math.pi else None
-
-
-HINT = "Look at the fields of the message; the node that sends it may be misconfigured."
-KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-"""By sensor_msgs/PointField, numpy's names."""
-LARGEST_STEP = 65_536
-MOST_POINTS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

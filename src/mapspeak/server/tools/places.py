@@ -41,6 +41,13 @@ Places = Annotated[
     ),
 ]
 Start = Annotated[str, Field(description="where from", max_length=200)]
+Query = Annotated[str, Field(description="name or purpose", min_length=1, max_length=300)]
+Near = Annotated[str | None, Field(description="place, within 5 m", max_length=200)]
+Room = Annotated[str | None, Field(description="id", max_length=200)]
+Since = Annotated[str | None, Field(description="yesterday, 2h ago", max_length=40)]
+Until = Annotated[str | None, Field(description="seen before", max_length=40)]
+Kind = Annotated[EntryKind | None, Field(description="only these")]
+Count = Annotated[int, Field(description="most", ge=1, le=20, strict=True)]
 
 
 class PlaceTools:
@@ -108,15 +115,6 @@ class PlaceTools:
             )
 
         return await session.compute(describe)
-
-
-Query = Annotated[str, Field(description="name or purpose", min_length=1, max_length=300)]
-Near = Annotated[str | None, Field(description="place, within 5 m", max_length=200)]
-Room = Annotated[str | None, Field(description="id", max_length=200)]
-Since = Annotated[str | None, Field(description="yesterday, 2h ago", max_length=40)]
-Until = Annotated[str | None, Field(description="seen before", max_length=40)]
-Kind = Annotated[EntryKind | None, Field(description="only these")]
-Count = Annotated[int, Field(description="most", ge=1, le=20, strict=True)]
 
 
 class FindTools:
