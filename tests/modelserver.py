@@ -15,7 +15,8 @@ from enum import StrEnum
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Protocol
 
-from mapspeak.evaluation.agents.models.chat import Reply, decide
+from mapspeak.evaluation.agents.models.chat import Reply
+from mapspeak.evaluation.agents.models.mock import decide
 
 N_READ, N_CACHED, N_WRITTEN, N_THOUGHT = 100, 40, 10, 4
 """Tokens of every answer: all read, and of it from a cache; all written, and of it thoughts."""

@@ -19,6 +19,13 @@ from mapspeak.rosbridge_server.interfaces import (
 )
 
 ROS1_DISTRIBUTION = "noetic\n"
+Answers = dict[str, Callable[[Values], Values]]
+ROSAPI_NODE = "/rosapi"
+HIDDEN = "/_action/"
+OTHER_TYPES = {"action_servers": "GetActionServers", "get_ros_version": "GetROSVersion"}
+"""Services whose type is not called as they are."""
+NEVER_ANSWERED_ON_ROS2 = ("message_details", "get_param_names")
+"""On ROS 2 these end or hang rosapi: clients must not count on an answer."""
 
 
 class Parameters:
@@ -130,15 +137,6 @@ def _answers_of(node: str, parameters: Parameters, interfaces: Interfaces) -> di
 
 def _kind_of(value: object) -> int:
     return KIND_OF.get(type(value), NOT_SET)
-
-
-Answers = dict[str, Callable[[Values], Values]]
-ROSAPI_NODE = "/rosapi"
-HIDDEN = "/_action/"
-OTHER_TYPES = {"action_servers": "GetActionServers", "get_ros_version": "GetROSVersion"}
-"""Services whose type is not called as they are."""
-NEVER_ANSWERED_ON_ROS2 = ("message_details", "get_param_names")
-"""On ROS 2 these end or hang rosapi: clients must not count on an answer."""
 
 
 def add_rosapi(system: RosSystem, parameters: Parameters, clock: Callable[[], float]) -> None:

@@ -21,13 +21,13 @@ from mapspeak.evaluation.agents.catalogue import check_agent, find_agent
 from mapspeak.evaluation.agents.models.chat import (
     AnsweredCalls,
     Begin,
-    MockModel,
     ModelConversation,
     Reply,
     ToolCallRequest,
     estimate_picture_tokens,
     work_with_model,
 )
+from mapspeak.evaluation.agents.models.mock import MockModel
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.server.reports.representations import Representation
 from served import connect

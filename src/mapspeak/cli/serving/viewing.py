@@ -47,6 +47,29 @@ LOOK_S = 0.3
 """Wall time between two checks for requests of the page."""
 WAIT_S = 5.0
 """Wall time until a page that could not be served is tried again."""
+DEFAULT_FOXGLOVE = "127.0.0.1:8765"
+MARKERS_OPTION = click.option(
+    "--markers",
+    "has_markers",
+    is_flag=True,
+    help="Publish rooms, doors, frontiers, places, things, closed areas and the path on the "
+    "robot's ROS, for RViz: /mapspeak/markers (visualization_msgs/MarkerArray, latched).",
+)
+DRAWING_OPTIONS = (
+    MARKERS_OPTION,
+    click.option(
+        "--record",
+        type=FILE,
+        help="Record map, pose, camera, markers, calls and audit as MCAP (the extra foxglove).",
+    ),
+    click.option(
+        "--foxglove",
+        is_flag=False,
+        flag_value=DEFAULT_FOXGLOVE,
+        metavar="[HOST:PORT]",
+        help=f"Show the same live in Foxglove on this machine; at {DEFAULT_FOXGLOVE} by default.",
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -269,31 +292,6 @@ def _wait_for_pages(request: "ViewRequest", wait_s: float) -> dict[str, str]:
         if found and len(found) == len(before):
             break
     return found
-
-
-DEFAULT_FOXGLOVE = "127.0.0.1:8765"
-MARKERS_OPTION = click.option(
-    "--markers",
-    "has_markers",
-    is_flag=True,
-    help="Publish rooms, doors, frontiers, places, things, closed areas and the path on the "
-    "robot's ROS, for RViz: /mapspeak/markers (visualization_msgs/MarkerArray, latched).",
-)
-DRAWING_OPTIONS = (
-    MARKERS_OPTION,
-    click.option(
-        "--record",
-        type=FILE,
-        help="Record map, pose, camera, markers, calls and audit as MCAP (the extra foxglove).",
-    ),
-    click.option(
-        "--foxglove",
-        is_flag=False,
-        flag_value=DEFAULT_FOXGLOVE,
-        metavar="[HOST:PORT]",
-        help=f"Show the same live in Foxglove on this machine; at {DEFAULT_FOXGLOVE} by default.",
-    ),
-)
 
 
 def open_drawing(

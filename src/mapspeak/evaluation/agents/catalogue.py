@@ -15,7 +15,8 @@ from mapspeak.evaluation.agents.baselines import (
 )
 from mapspeak.evaluation.agents.command.agent import run_program
 from mapspeak.evaluation.agents.command.program import find_program
-from mapspeak.evaluation.agents.models.chat import Begin, MockModel, Thinking, work_with_model
+from mapspeak.evaluation.agents.models.chat import Begin, Thinking, work_with_model
+from mapspeak.evaluation.agents.models.mock import MockModel
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.trials import Setting

@@ -27,6 +27,24 @@ INVISIBLE = re.compile(
     "|[\ud800-\udfff]"
 )
 """Control characters, and characters that change the text direction: they are spelled out."""
+MOST_SAID = 240
+"""Characters of an error in the list; all of it is in the replay."""
+NOT_RUN = "not run"
+PAPER_TASKS = ("explore", "smallest-room", "fire-tool")
+"""The names of its Tasks 1 to 3 here."""
+PAPER_NOTE = (
+    "The paper's figures are as it printed them: one warehouse in NVIDIA Isaac Sim, Task 1 once, "
+    "Tasks 2 and 3 thirty times each, Claude Sonnet 4.6 and GPT-5.5. They were not measured here, "
+    "and another simulator, other worlds and another robot stand behind ours. Its coverage is the "
+    "free area of the map over the free area of the building, wherever it lies; ours is given by "
+    "that ratio too, and as recall: the share of the floor in sight that the map shows as free. "
+    "What is known is the share of the reachable floor that the map knows, be it as free or as "
+    "solid. The intervals of its counts are ours, after Wilson."
+)
+PAPER_TRIALS = 30
+PAPER_ROWS = (("Claude Sonnet 4.6", 0.9783, 26, 30), ("GPT-5.5", 0.9978, 28, 30))
+"""Results of each model in the paper: the coverage of one run of Task 1 by its own ratio, and the
+number of thirty trials of Task 2 and of Task 3 that succeeded."""
 
 
 def text(value: object) -> Html:
@@ -76,30 +94,6 @@ def document(title: str, *body: Html) -> bytes:
     )
     page = element("html", {"lang": "en"}, element("head", {}, *head), element("body", {}, *body))
     return f"<!doctype html>\n{page}\n".encode(errors="replace")
-
-
-MOST_SAID = 240
-"""Characters of an error in the list; all of it is in the replay."""
-NOT_RUN = "not run"
-
-PAPER_TASKS = ("explore", "smallest-room", "fire-tool")
-"""The names of its Tasks 1 to 3 here."""
-
-PAPER_NOTE = (
-    "The paper's figures are as it printed them: one warehouse in NVIDIA Isaac Sim, Task 1 once, "
-    "Tasks 2 and 3 thirty times each, Claude Sonnet 4.6 and GPT-5.5. They were not measured here, "
-    "and another simulator, other worlds and another robot stand behind ours. Its coverage is the "
-    "free area of the map over the free area of the building, wherever it lies; ours is given by "
-    "that ratio too, and as recall: the share of the floor in sight that the map shows as free. "
-    "What is known is the share of the reachable floor that the map knows, be it as free or as "
-    "solid. The intervals of its counts are ours, after Wilson."
-)
-
-
-PAPER_TRIALS = 30
-PAPER_ROWS = (("Claude Sonnet 4.6", 0.9783, 26, 30), ("GPT-5.5", 0.9978, 28, 30))
-"""Results of each model in the paper: the coverage of one run of Task 1 by its own ratio, and the
-number of thirty trials of Task 2 and of Task 3 that succeeded."""
 
 
 def write_page(run: Path, results: Sequence[TrialResult]) -> Path:

@@ -43,6 +43,14 @@ OWN_DOOR_M = 0.3
 OWN_THING_M = 0.6
 THERE_M = 0.25
 THERE_RAD = math.radians(12.0)
+BEYOND_M = 1.0
+"""A ray that ends in the unknown meets a wall so much farther on."""
+LEAST_NEW_M = 0.5
+"""Where no heading shows more new wall of a room, it is shown as a whole."""
+MOVED_M = 1.0
+"""A place farther from a goal is another one."""
+Face = Callable[[WorldModel, Pose, Sequence[CameraView]], Pose]
+"""Turns a pose to what a picture should show."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,18 +210,6 @@ def _stand_off(world: WorldModel, target: Point) -> Pose | None:
         if is_in_sight(world.grid, point, target, own_m=OWN_DOOR_M):
             return Pose(point.x, point.y, point.bearing_to(target))
     return None
-
-
-BEYOND_M = 1.0
-"""A ray that ends in the unknown meets a wall so much farther on."""
-LEAST_NEW_M = 0.5
-"""Where no heading shows more new wall of a room, it is shown as a whole."""
-MOVED_M = 1.0
-"""A place farther from a goal is another one."""
-
-
-Face = Callable[[WorldModel, Pose, Sequence[CameraView]], Pose]
-"""Turns a pose to what a picture should show."""
 
 
 def aim_for_picture(

@@ -46,6 +46,18 @@ RAISE_BOUND = (
     "A room may lie behind any frontier that is left: call {explore} with a higher known_percent, "
     "or without it, to see the rest. With the same bound it ends at once."
 )
+DETOUR_M = 0.05
+ROUTE_NEXT_STEP = {
+    RouteState.DRIVING: "Call {follow_route} without stops to go on. {stop_robot} ends it.",
+    RouteState.AT_STOP: "Look, record what matters, then call {follow_route} without stops.",
+    RouteState.BLOCKED: (
+        "Call {follow_route} without stops to try again, or with when_blocked=skip to leave it out."
+    ),
+    RouteState.INTERRUPTED: (
+        "The robot was stopped or sent elsewhere. Call {follow_route} without stops to go on."
+    ),
+    RouteState.DONE: "The route is over.",
+}
 
 
 class ExploreAnswer(Report):
@@ -189,20 +201,6 @@ class SearchAnswer(Report):
             pose_uncertain=say_pose_doubt(standing.pose_doubt),
             next_step=lead(SEARCH_STEP[standing.state]),
         )
-
-
-DETOUR_M = 0.05
-ROUTE_NEXT_STEP = {
-    RouteState.DRIVING: "Call {follow_route} without stops to go on. {stop_robot} ends it.",
-    RouteState.AT_STOP: "Look, record what matters, then call {follow_route} without stops.",
-    RouteState.BLOCKED: (
-        "Call {follow_route} without stops to try again, or with when_blocked=skip to leave it out."
-    ),
-    RouteState.INTERRUPTED: (
-        "The robot was stopped or sent elsewhere. Call {follow_route} without stops to go on."
-    ),
-    RouteState.DONE: "The route is over.",
-}
 
 
 class RouteAnswer(Report):

@@ -32,33 +32,6 @@ from mapspeak.spatial.picture import PictureRegion as Area
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.worldmodel.model import WorldModel
 
-
-def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
-    """Return the caption of the map in grey levels and nothing else."""
-    return (
-        f"{_say_placement(grid, picture)} Grey 127 is unknown, 255 free, darker the more surely "
-        "occupied. x grows to the right and y upwards."
-    )
-
-
-def say_axes(grid: OccupancyGrid, picture: MapPicture) -> str:
-    """Return the caption of the map with its axes."""
-    return (
-        f"{_say_placement(grid, picture)} A grid line every {picture.spacing_m:g} m, numbered in "
-        "metres of the map frame; x grows to the right and y upwards."
-    )
-
-
-def _say_placement(grid: OccupancyGrid, picture: MapPicture) -> str:
-    view = picture.view
-    left, bottom = view.area_corners()[3]
-    return (
-        f"Map picture, {view.width_px} x {view.height_px} px; the map in it has "
-        f"{view.pixels_per_m * grid.resolution_m:g} px per cell of {grid.resolution_m:g} m; "
-        f"lower left corner at x {left:.3f}, y {bottom:.3f}."
-    )
-
-
 NAVIGATION_COLOURS = {
     NavigationPart.PLAN: Colour.GREEN,
     NavigationPart.FOOTPRINT: Colour.INK,
@@ -86,11 +59,36 @@ LEGEND = (
     ),
 )
 GREYS = "White free, grey unknown, black walls; the legend below the map explains the rest."
-
 DETAIL_PX_PER_M = 8.0
 """From this scale on doors can be told apart, and areas written into rooms."""
 MOST_LEFT_OUT = 20
 WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
+
+
+def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
+    """Return the caption of the map in grey levels and nothing else."""
+    return (
+        f"{_say_placement(grid, picture)} Grey 127 is unknown, 255 free, darker the more surely "
+        "occupied. x grows to the right and y upwards."
+    )
+
+
+def say_axes(grid: OccupancyGrid, picture: MapPicture) -> str:
+    """Return the caption of the map with its axes."""
+    return (
+        f"{_say_placement(grid, picture)} A grid line every {picture.spacing_m:g} m, numbered in "
+        "metres of the map frame; x grows to the right and y upwards."
+    )
+
+
+def _say_placement(grid: OccupancyGrid, picture: MapPicture) -> str:
+    view = picture.view
+    left, bottom = view.area_corners()[3]
+    return (
+        f"Map picture, {view.width_px} x {view.height_px} px; the map in it has "
+        f"{view.pixels_per_m * grid.resolution_m:g} px per cell of {grid.resolution_m:g} m; "
+        f"lower left corner at x {left:.3f}, y {bottom:.3f}."
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

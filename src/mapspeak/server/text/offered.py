@@ -14,6 +14,12 @@ SENTENCE = re.compile(r"(?<=[.!?]) ")
 
 # State of a call, not of the module. None: all tools are offered.
 _OFFERED: ContextVar[frozenset[str] | None] = ContextVar("offered", default=None)
+DISAGREED = (
+    "The person who was asked did not agree. Do not ask again; tell them what you need it for."
+)
+ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
+"""A name of an argument, or the number of an item; pydantic names the tried types among them."""
+INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
 
 
 @contextmanager
@@ -79,14 +85,6 @@ def say_hint(error: MapspeakError) -> str:
     if error.step is None:
         return error.hint
     return lead(STEPS[error.step], hint=error.hint.removesuffix("."), about=error.about)
-
-
-DISAGREED = (
-    "The person who was asked did not agree. Do not ask again; tell them what you need it for."
-)
-ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
-"""A name of an argument, or the number of an item; pydantic names the tried types among them."""
-INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
 
 
 def explain(name: str, cause: BaseException | None) -> str | None:

@@ -22,6 +22,9 @@ from mapspeak.safety import Approval, ApprovalNeededError, Approvals, Otherwise
 
 LONGEST_WAIT_S = 25.0
 """Clients give up on a call that takes much longer."""
+CALLS_AGAIN = "2026-07-28"
+"""From this version of the protocol on a client is asked by an answer that it calls again with."""
+KEY = "approval-"
 
 
 def _shorten_wait(wait_s: Any) -> Any:  # noqa: ANN401 - what is no number is refused later
@@ -57,11 +60,6 @@ def tell_progress(context: Context) -> OnProgress:
         )
 
     return tell
-
-
-CALLS_AGAIN = "2026-07-28"
-"""From this version of the protocol on a client is asked by an answer that it calls again with."""
-KEY = "approval-"
 
 
 class Agreement(BaseModel):

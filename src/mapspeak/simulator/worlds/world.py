@@ -23,6 +23,8 @@ BODY_BAND_M = (0.02, 1.2)
 """The heights between which its body, camera mast included, bumps into things."""
 LEAF_M, LEAF_HEIGHT_M = 0.05, 2.1
 """Of a door that is shut."""
+WALL_HEIGHT_M = 2.6
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,11 +134,6 @@ class World:
     doors: tuple[WorldDoor, ...] = ()
     battery_ratio: float = 1.0
     n_faults: Mapping[str, int] = field(default_factory=dict)
-
-
-WALL_HEIGHT_M = 2.6
-
-Mask = NDArray[np.bool_]
 
 
 def build_map_world(grid: OccupancyGrid, *, name: str, start: Pose | None = None) -> World:

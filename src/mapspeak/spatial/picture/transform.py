@@ -23,6 +23,14 @@ NORTH_UP_RAD = math.pi / 2
 _ANGLE_SLACK_RAD = 1e-9
 _BORDER_SLACK_PX = 1e-6
 """Rounding in the last digits must not push a cell's corner into the pixel before it."""
+_N_LINES_ALONG_LONG_SIDE = 8.5
+"""Between 6 and 12: enough to read coordinates from, few enough to see the map."""
+_PAPER_N_LINES = 15
+_PAPER_MAX_LINES = 90
+_STEPS = (1.0, 2.0, 5.0)
+Number = TypeVar("Number", np.int8, np.uint16)
+_MAX_SAMPLE_STEP_CELLS = 0.7
+"""A lattice this fine has a point in every cell, however it is turned (below 1/sqrt 2)."""
 
 
 def is_north_up(up_rad: float) -> bool:
@@ -130,14 +138,6 @@ class PictureView:
         return yaw_rad - self.up_rad + NORTH_UP_RAD
 
 
-_N_LINES_ALONG_LONG_SIDE = 8.5
-"""Between 6 and 12: enough to read coordinates from, few enough to see the map."""
-
-_PAPER_N_LINES = 15
-_PAPER_MAX_LINES = 90
-_STEPS = (1.0, 2.0, 5.0)
-
-
 def even_spacing_m(longest_m: float) -> float:
     """Return the spacing that puts about 6 to 12 lines across the longest side of a map."""
     return round_length_m(longest_m / _N_LINES_ALONG_LONG_SIDE)
@@ -162,12 +162,6 @@ def paper_spacing_m(width_m: float, height_m: float, resolution_m: float) -> flo
 def _candidates(around_m: float) -> list[float]:
     exponent = math.floor(math.log10(around_m))
     return [step * 10.0**power for power in range(exponent - 1, exponent + 2) for step in _STEPS]
-
-
-Number = TypeVar("Number", np.int8, np.uint16)
-
-_MAX_SAMPLE_STEP_CELLS = 0.7
-"""A lattice this fine has a point in every cell, however it is turned (below 1/sqrt 2)."""
 
 
 def is_aligned(grid: OccupancyGrid, up_rad: float) -> bool:

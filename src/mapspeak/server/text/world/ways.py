@@ -37,6 +37,9 @@ NOTHING = (
     "Nothing is known to be blocked: the robot gets to every room, door and remembered place, and "
     "no drive has failed."
 )
+MOST_WAYS = 30
+MOST_SIZES = 60
+MOST_REASONS = 6
 
 
 def describe_blocked(
@@ -133,11 +136,6 @@ def _say_drive(drive: Drive, now_s: float) -> str:
     where = f"{drive.goal_id} to {shorten(drive.place)} at {say_point(drive.goal.point)}"
     sent = f"sent {max(now_s - drive.started_s, 0.0) / 60:.0f} min ago"
     return f"{where}, {sent}: {' '.join(filter(None, (state, why and f'({why})')))}."
-
-
-MOST_WAYS = 30
-MOST_SIZES = 60
-MOST_REASONS = 6
 
 
 def describe_measures(world: WorldModel, *, start: str, places: Sequence[str] | None) -> str:
