@@ -36,11 +36,11 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
 
 
 MEMORY_COMMANDS: Mapping[str, tuple[str, str]] = {
-    "check": ("memory.episodes:check", "check the file, and on a map whether it can be true"),
+    "check": ("memory.queries:check", "check the file, and on a map whether it can be true"),
     "copy": ("memory.places:copy", "copy a memory into an empty one, file or database"),
-    "episodes": ("memory.episodes:episodes", "list what was observed, when and from where"),
+    "episodes": ("memory.queries:episodes", "list what was observed, when and from where"),
     "export": ("memory.places:export", "write the places as GeoJSON"),
-    "find": ("memory.episodes:find", "find the places and things that words may mean"),
+    "find": ("memory.queries:find", "find the places and things that words may mean"),
     "forget": ("memory.places:forget", "forget a place, or all landmarks of a label; or undo it"),
     "import": ("memory.places:import_", "join exported, perhaps edited GeoJSON into the memory"),
     "list": ("memory.places:list_", "list all places"),
