@@ -128,9 +128,9 @@ class Session:
     async def client_is_gone(self, client: str) -> None:
         """Stop the robot when the client that sent it somewhere has gone away."""
         cause = Cause(code=CauseCode.CLIENT_GONE)
-        self.drives.dismiss(cause, client=client)
+        self.drives.dismiss(cause, owner=client)
         drive = self.drives.under_way
-        is_drivers = self.drives.is_busy and (drive is None or drive.client == client)
+        is_drivers = self.drives.is_busy and (drive is None or drive.caller.owner == client)
         if is_drivers or client in started_over(self.ros).owners:
             logger.warning("The client hung up during its drive: stopping the robot.")
             await self.drives.stop(cause)

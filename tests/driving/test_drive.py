@@ -11,7 +11,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
-from mapspeak.safety import WhenBusy
+from mapspeak.safety import Caller, WhenBusy, calling, current_caller
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
@@ -20,8 +20,8 @@ NEAR, FAR = Pose(2.5, 1.4), Pose(6.0, 1.4)
 
 
 async def start(drives: DriveBook, goal: Pose, *, client: str = "") -> Drive:
-    with drives.preparing() as ticket:
-        return await drives.start(goal, place="there", ticket=ticket, client=client)
+    with calling(Caller(session=client)), drives.preparing() as ticket:
+        return await drives.start(goal, place="there", ticket=ticket)
 
 
 async def state_of(drives: DriveBook, drive: Drive) -> GoalState:
@@ -68,6 +68,29 @@ async def test_a_drive_that_waits_begins_though_nobody_waits_for_it() -> None:
     await robot.sleep(5.0)
     await drives.watch()
     assert await state_of(drives, second) is GoalState.DRIVING
+
+
+class NotingRobot(FakeRobot):
+    """Notes for whom it is sent."""
+
+    def __init__(self) -> None:
+        super().__init__(two_rooms())
+        self.sent_for: list[str] = []
+
+    async def send_goal(self, goal: Pose) -> str:
+        self.sent_for.append(current_caller().session)
+        return await super().send_goal(goal)
+
+
+async def test_a_drive_that_waits_is_sent_for_its_own_client_whoever_asks_then() -> None:
+    robot = NotingRobot()
+    drives = DriveBook(robot, when_busy=WhenBusy.WAIT)
+    first = await start(drives, NEAR, client="one")
+    await start(drives, FAR, client="two")
+    with calling(Caller(session="one")):
+        await drives.wait(first.goal_id, wait_s=25.0, on_progress=tell_nobody)
+        await drives.watch()
+    assert robot.sent_for == ["one", "two"]
 
 
 async def test_a_drive_that_waits_can_be_cancelled_and_is_stopped_with_the_rest() -> None:

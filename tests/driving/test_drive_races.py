@@ -13,7 +13,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import CauseCode, GoalState
-from mapspeak.safety import WhenBusy
+from mapspeak.safety import Caller, WhenBusy, calling
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
@@ -23,8 +23,8 @@ ELSEWHERE = Pose(5.9, 0.7)
 
 
 async def start(drives: DriveBook, goal: Pose, *, client: str = "") -> Drive:
-    with drives.preparing() as ticket:
-        return await drives.start(goal, place="there", ticket=ticket, client=client)
+    with calling(Caller(session=client)), drives.preparing() as ticket:
+        return await drives.start(goal, place="there", ticket=ticket)
 
 
 async def state_of(drives: DriveBook, drive: Drive) -> GoalState:
@@ -133,7 +133,7 @@ async def test_who_gives_up_waiting_for_the_latest_drive_ends_no_drive_of_anothe
         await drives.wait(None, wait_s=20.0, on_progress=lose_to_another)
     latest = drives.latest
     assert latest is not None
-    assert latest.client == "two"
+    assert latest.caller.session == "two"
     assert await state_of(drives, latest) is GoalState.DRIVING
 
 

@@ -22,6 +22,7 @@ from mapspeak.geometry import Pose
 from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
 from mapspeak.robot import GoalState
 from mapspeak.session import Session
+from mapspeak.safety import Caller, calling
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import NOTHING_TRIED, FrontierReport
 from mapspeak.worldmodel.model import WorldModel
@@ -56,8 +57,8 @@ async def tell_nobody(_report: DriveReport) -> None:
 async def drive_often(drives: DriveBook, n_drives: int = 210) -> None:
     """Sends the robot to and fro until old drives are forgotten."""
     for _ in range(n_drives):
-        with drives.preparing() as ticket:
-            await drives.start(NEAR, place="there", ticket=ticket, client="another")
+        with calling(Caller(session="another")), drives.preparing() as ticket:
+            await drives.start(NEAR, place="there", ticket=ticket)
 
 
 async def test_two_calls_that_explore_at_once_count_each_frontier_once(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.memory import SemanticMapStore
+from mapspeak.safety import Caller, calling
 from mapspeak.server.app import build_server
 from mapspeak.server.transport import HangUpWatch, serve_http
 from mapspeak.server.wire.access import TokenGuard
@@ -85,9 +86,9 @@ async def test_a_client_that_goes_before_its_answer_has_come_is_noticed(
 async def test_a_drive_ends_when_its_client_is_gone(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
-    with session.drives.preparing() as ticket:
+    with calling(Caller(session="mine")), session.drives.preparing() as ticket:
         goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
-        await session.drives.start(goal.pose, place=goal.name, ticket=ticket, client="mine")
+        await session.drives.start(goal.pose, place=goal.name, ticket=ticket)
     await build_server(session).note_hang_up("another")
     assert session.drives.under_way is not None
     await build_server(session).note_hang_up("mine")
@@ -136,9 +137,9 @@ async def drive_over_http(folder: Path) -> AsyncGenerator[tuple[FakeRobot, str, 
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(serve_http, build_server(session), address)
             client = await begin_session(address)
-            with session.drives.preparing() as ticket:
+            with calling(Caller(session=client)), session.drives.preparing() as ticket:
                 goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
-                await session.drives.start(goal.pose, place=goal.name, ticket=ticket, client=client)
+                await session.drives.start(goal.pose, place=goal.name, ticket=ticket)
             yield robot, address, client
             tasks.cancel_scope.cancel()
 
@@ -270,9 +271,9 @@ async def test_the_skills_of_a_client_that_is_gone_end_though_the_robot_is_out_o
         run = await server.skills.runs.begin(
             FakeSkill(spec(), do=never), {}, client="mine", wait_s=0.0
         )
-        with session.drives.preparing() as ticket:
+        with calling(Caller(session="mine")), session.drives.preparing() as ticket:
             goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
-            await session.drives.start(goal.pose, place=goal.name, ticket=ticket, client="mine")
+            await session.drives.start(goal.pose, place=goal.name, ticket=ticket)
         with pytest.raises(LinkError):
             await server.note_hang_up("mine")
         assert run.is_over

@@ -21,7 +21,7 @@ from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot
-from mapspeak.safety import WhenBusy
+from mapspeak.safety import WhenBusy, calling, current_caller
 
 POLL_S = 0.2
 PROGRESS_S = 1.0
@@ -108,12 +108,11 @@ class DriveBook:
         *,
         place: str,
         ticket: int,
-        client: str = "",
         purpose: GoalPurpose = GoalPurpose.ARRIVE,
     ) -> Drive:
         """Send a goal to the robot, or let it wait its turn.
 
-        A newer drive of the same client replaces the older one.
+        A newer drive of the same owner replaces the older one.
 
         Args:
             ticket: From `preparing`.
@@ -124,6 +123,7 @@ class DriveBook:
             LinkError: The robot cannot be reached, or its pose is unknown.
             PolicyError: The robot must not drive there.
         """
+        caller = current_caller()
         async with self._starting:
             busy = await self._find_busy()
             await self._monitor.find_robot()
@@ -134,18 +134,18 @@ class DriveBook:
                 place=place,
                 robot_goal_id=None,
                 started_s=self._robot.now_s,
-                client=client,
+                caller=caller,
                 ticket=ticket,
                 purpose=purpose,
             )
-            is_other = busy is not None and busy.client != client
+            is_other = busy is not None and busy.caller.owner != caller.owner
             when_busy = self._when_busy if is_other else WhenBusy.REPLACE
             if busy is None or when_busy is WhenBusy.REPLACE:
                 drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
                 self._end_all(Cause(code=CauseCode.REPLACED), but=drive)
                 return drive
             if when_busy is WhenBusy.WAIT:
-                self.dismiss(Cause(code=CauseCode.REPLACED), client=client)
+                self.dismiss(Cause(code=CauseCode.REPLACED), owner=caller.owner)
                 return self._keep(drive)
             raise GoalError(
                 f"{busy.goal_id} to {busy.place} is under way.",
@@ -264,10 +264,10 @@ class DriveBook:
                 if report.status.state is GoalState.CANCELLED:
                     self._keep(replace(report.drive, final=replace(report.status, cause=cause)))
 
-    def dismiss(self, cause: Cause, *, client: str | None = None) -> None:
-        """End the drives that wait their turn, those of one client or all."""
+    def dismiss(self, cause: Cause, *, owner: str | None = None) -> None:
+        """End the drives that wait their turn, those of one owner or all."""
         for drive in self._waiting():
-            if client in (None, drive.client):
+            if owner in (None, drive.caller.owner):
                 self._end(drive, GoalStatus(state=GoalState.CANCELLED, cause=cause))
 
     # --- inside ---
@@ -329,7 +329,8 @@ class DriveBook:
                 return
             drive = self._waiting()[0]
             try:
-                await self._send(drive)
+                with calling(drive.caller):
+                    await self._send(drive)
             except MapspeakError as error:
                 cause = Cause(code=CauseCode.REFUSED, quote=str(error))
                 self._end(drive, GoalStatus(state=GoalState.REJECTED, cause=cause))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
+from mapspeak.safety import NOBODY, Caller
 
 JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
 FRONTIER = re.compile(r"F\d+")
@@ -20,7 +21,7 @@ class Drive:
         goal_id: The name it goes by: G1, G2, ...
         place: What the goal was called when it was asked for.
         robot_goal_id: What the robot's navigation calls it; None before it was sent there.
-        client: Who asked for it; empty where there can be only one.
+        caller: Who asked for it.
         ticket: What it was started with; a stop since then ends also what was to follow it.
         purpose: What the robot comes for.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
@@ -34,7 +35,7 @@ class Drive:
     place: str
     robot_goal_id: str | None
     started_s: float
-    client: str = ""
+    caller: Caller = NOBODY
     ticket: int = 0
     purpose: GoalPurpose = GoalPurpose.ARRIVE
     begun_at: Point | None = None

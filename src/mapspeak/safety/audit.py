@@ -25,11 +25,18 @@ class Caller:
     Attributes:
         client: The client's session; empty where mapspeak acts by itself.
         session: The client's HTTP session; empty on stdio and for clients without one.
+        mission: The mission that acts for it; empty where it acts by itself.
     """
 
     client: str = ""
     tool: str = ""
     session: str = ""
+    mission: str = ""
+
+    @property
+    def owner(self) -> str:
+        """Whose the drives and goals are: a mission goes on when its client is gone."""
+        return f"mission {self.mission}" if self.mission else self.session
 
 
 NOBODY = Caller()

@@ -5,11 +5,19 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from contextvars import ContextVar
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from mapspeak.errors import SkillError
-from mapspeak.safety import ApprovalScope, CommandKind, RunSkill, within_scope
+from mapspeak.safety import (
+    ApprovalScope,
+    CommandKind,
+    RunSkill,
+    calling,
+    current_caller,
+    within_scope,
+)
 from mapspeak.skill import Arguments, JsonValue, OnProgress, Skill, SkillOutcome, SkillSpec
 from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
@@ -98,7 +106,8 @@ class MissionDesk:
         self.latest = course = MissionCourse(mission, given)
         token = _PARTS.set(bounds.parts)
         try:
-            with self._present(), within_scope(scope):
+            acting = replace(current_caller(), mission=spec.name)
+            with self._present(), within_scope(scope), calling(acting):
                 return await self._gate.run_once(
                     spec,
                     partial(self._go_recorded, course, on_progress),

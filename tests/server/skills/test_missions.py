@@ -192,6 +192,17 @@ async def test_a_mission_that_is_cancelled_leaves_the_robot_standing_and_says_wh
     assert "3 drive: cut off" in told
 
 
+async def test_a_drive_of_a_mission_goes_on_when_a_client_without_a_session_hangs_up(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        caller.robot.may_drive = anyio.Event()
+        await caller.ask("run_mission", tree="- drive: R2\n", wait_s=0)
+        await caller.server.note_hang_up("")
+        caller.robot.may_drive.set()
+        assert "2 drive: succeeded" in await caller.until("succeeded")
+
+
 async def test_a_drive_of_somebody_else_ends_the_mission(tmp_path: Path) -> None:
     async with missions(tmp_path) as caller:
         caller.robot.may_drive = anyio.Event()

@@ -156,7 +156,7 @@ def scope_of(place: str) -> ApprovalScope:
     return ApprovalScope(what=what, n_drives=MOST_DRIVES, duration_s=SCOPE_S)
 
 
-async def turn_for_picture(site: PictureContext, *, client: str, on_progress: OnProgress) -> None:
+async def turn_for_picture(site: PictureContext, *, on_progress: OnProgress) -> None:
     """Turn the robot where it stands to what no picture shows.
 
     It stays as it is without a camera, and where it was stopped or another client drives it.
@@ -168,7 +168,7 @@ async def turn_for_picture(site: PictureContext, *, client: str, on_progress: On
     if pose == world.robot:
         return
     with suppress(GoalError, PolicyError):
-        await turn_to(site, pose.yaw_rad, wait_s=TURN_S, on_progress=on_progress, client=client)
+        await turn_to(site, pose.yaw_rad, wait_s=TURN_S, on_progress=on_progress)
 
 
 async def end_for_picture(
@@ -218,7 +218,7 @@ async def _drive_nearby(
     pose = Pose(point.x, point.y, drive.goal.yaw_rad)
     pose = await site.compute(partial(_choose_face(drive), world, pose, views))
     nearby = await site.drives.start(
-        pose, place=drive.place, ticket=drive.ticket, client=drive.client, purpose=drive.purpose
+        pose, place=drive.place, ticket=drive.ticket, purpose=drive.purpose
     )
     return await site.drives.wait(nearby.goal_id, wait_s=wait_s, on_progress=on_progress)
 
@@ -231,9 +231,7 @@ async def _turn_to_new_walls(
     pose = await site.compute(partial(_choose_face(drive), world, report.pose, views))
     if pose == report.pose:
         return report
-    turn = await site.drives.start(
-        pose, place=name_turn(pose), ticket=drive.ticket, client=drive.client
-    )
+    turn = await site.drives.start(pose, place=name_turn(pose), ticket=drive.ticket)
     turned = await site.drives.wait(turn.goal_id, wait_s=TURN_S, on_progress=on_progress)
     faced = replace(drive.goal, yaw_rad=pose.yaw_rad)
     return replace(

@@ -82,7 +82,7 @@ class Explorer:
         return not self._state.is_end
 
     async def advance(
-        self, bounds: Bounds | None, *, wait_s: float, on_trip: OnProgress, client: str = ""
+        self, bounds: Bounds | None, *, wait_s: float, on_trip: OnProgress
     ) -> Progress:
         """Explore until it ends, pauses, or `wait_s` of robot time have passed; begin if needed.
 
@@ -101,9 +101,9 @@ class Explorer:
                 self._paused_at, self._elapsed_s, self._bounds = None, 0.0, Bounds()
                 self._told_ratio = None
             self._bounds = bounds or self._bounds
-            return await self._advance(wait_s, on_trip, client)
+            return await self._advance(wait_s, on_trip)
 
-    async def _advance(self, wait_s: float, on_trip: OnProgress, client: str) -> Progress:
+    async def _advance(self, wait_s: float, on_trip: OnProgress) -> Progress:
         begun_s, before_s = self._site.robot.now_s, self._elapsed_s
         while True:
             with self._site.drives.preparing() as ticket:
@@ -115,10 +115,10 @@ class Explorer:
                     return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
                 if (seen_id := self._find_seen_from_here(world)) is not None:
                     await self._trips.give_up(is_seen=True)
-                    await turn_for_picture(self._site, client=client, on_progress=on_trip)
+                    await turn_for_picture(self._site, on_progress=on_trip)
                     world = await self._site.fetch_world_model()
                     return await self._end(world, ExplorationState.AT_GOAL, seen_id=seen_id)
-                state = await self._choose(world, ticket, client)
+                state = await self._choose(world, ticket)
             if state is None:
                 judge = partial(judge_end, world, self._blocked(world))
                 return await self._end(world, await self._site.compute(judge))
@@ -133,7 +133,7 @@ class Explorer:
             # A simulation that is begun anew sets its clock back.
             ended = self._after(state, is_late=not 0.0 <= spent_s < wait_s - SLACK_S)
             if ended is ExplorationState.AT_GOAL:
-                await turn_for_picture(self._site, client=client, on_progress=on_trip)
+                await turn_for_picture(self._site, on_progress=on_trip)
             if ended is not None:
                 return await self._end(await self._site.fetch_world_model(), ended)
 
@@ -165,7 +165,7 @@ class Explorer:
             return None
         return trip.target.id
 
-    async def _choose(self, world: WorldModel, ticket: int, client: str) -> TripState | None:
+    async def _choose(self, world: WorldModel, ticket: int) -> TripState | None:
         """Set out to the next target if there is no trip, or its target has been seen from afar.
 
         Return None when no target is left.
@@ -179,7 +179,7 @@ class Explorer:
             return None
         if trip is not None and trip.target.pose == target.pose:
             return TripState.UNDER_WAY
-        return await self._trips.set_out(target, ticket=ticket, client=client, grid=world.grid)
+        return await self._trips.set_out(target, ticket=ticket, grid=world.grid)
 
     def _find_target(self, world: WorldModel) -> Target | None:
         """Return the next frontier; where none is left, a place that was blocked before."""

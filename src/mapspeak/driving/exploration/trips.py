@@ -48,7 +48,7 @@ class TripContext(Protocol):
 
 
 async def turn_to(
-    site: TripContext, yaw_rad: float, *, wait_s: float, on_progress: OnProgress, client: str = ""
+    site: TripContext, yaw_rad: float, *, wait_s: float, on_progress: OnProgress
 ) -> DriveReport:
     """Turn the robot where it stands, and return how that went.
 
@@ -59,7 +59,7 @@ async def turn_to(
     with site.drives.preparing() as ticket:
         here = (await site.robot.fetch_pose()).pose
         goal = Pose(here.x, here.y, wrap_angle(yaw_rad))
-        drive = await site.drives.start(goal, place=name_turn(goal), ticket=ticket, client=client)
+        drive = await site.drives.start(goal, place=name_turn(goal), ticket=ticket)
     return await site.drives.wait(drive.goal_id, wait_s=wait_s, on_progress=on_progress)
 
 
@@ -146,9 +146,7 @@ class Trips:
         self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = self.n_ended = 0
         self._ended_m, self._begun_at_m = 0.0, self._site.drives.driven_m
 
-    async def set_out(
-        self, target: Target, *, ticket: int, client: str, grid: OccupancyGrid
-    ) -> TripState:
+    async def set_out(self, target: Target, *, ticket: int, grid: OccupancyGrid) -> TripState:
         """Send the robot to a target; one it was on the way to is given up.
 
         Args:
@@ -158,9 +156,7 @@ class Trips:
             PolicyError: The robot must not drive now, wherever to.
         """
         try:
-            drive = await self._site.drives.start(
-                target.pose, place=target.id, ticket=ticket, client=client
-            )
+            drive = await self._site.drives.start(target.pose, place=target.id, ticket=ticket)
         except GoalError as error:
             return self._take_in_refusal(target, error.message, ticket=ticket, grid=grid)
         self.n_seen += self._leave() is not None
@@ -253,7 +249,7 @@ class Trips:
     def _is_replaced_by_own(self, report: DriveReport) -> bool:
         """Return True when the same client drove elsewhere meanwhile, and that drive has ended."""
         cause, latest = report.status.cause, self._site.drives.latest
-        is_own = latest is not None and latest.client == report.drive.client
+        is_own = latest is not None and latest.caller.owner == report.drive.caller.owner
         is_replaced = cause is not None and cause.code is CauseCode.REPLACED
         return is_replaced and is_own and self._site.drives.under_way is None
 

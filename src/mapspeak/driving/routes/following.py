@@ -110,7 +110,7 @@ class RouteBook:
         return plan
 
     async def advance(
-        self, *, wait_s: float, when_blocked: WhenBlocked, on_progress: OnProgress, client: str = ""
+        self, *, wait_s: float, when_blocked: WhenBlocked, on_progress: OnProgress
     ) -> RouteProgress:
         """Follow the route until it ends, pauses, or `wait_s` of robot time have passed.
 
@@ -132,16 +132,16 @@ class RouteBook:
             )
         async with self._advancing:
             deadline_s = self._site.robot.now_s + wait_s
-            return await self._advance(deadline_s, when_blocked, on_progress, client)
+            return await self._advance(deadline_s, when_blocked, on_progress)
 
     async def _advance(
-        self, deadline_s: float, when_blocked: WhenBlocked, on_progress: OnProgress, client: str
+        self, deadline_s: float, when_blocked: WhenBlocked, on_progress: OnProgress
     ) -> RouteProgress:
         await self._forget_ended()
         while (number := self._find_next()) is not None:
             if not await self._pause(deadline_s):
                 return await self._tell(RouteState.DRIVING, is_pausing=True)
-            if self._goal_id is None and (check := await self._set_out(number, client)):
+            if self._goal_id is None and (check := await self._set_out(number)):
                 ended = await self._leave_out(number, check, when_blocked)
             else:
                 ended = await self._drive(number, deadline_s, when_blocked, on_progress)
@@ -165,7 +165,7 @@ class RouteBook:
         ahead = (n for n, stop in enumerate(self._plan.stops) if stop.state is StopState.AHEAD)
         return next(ahead, None)
 
-    async def _set_out(self, number: int, client: str) -> GoalCheck | None:
+    async def _set_out(self, number: int) -> GoalCheck | None:
         """Start the drive to a stop; return the check of its pose where it cannot be driven to."""
         goal, drives = self._plan.stops[number].goal, self._site.drives
         with drives.preparing() as ticket:
@@ -173,7 +173,7 @@ class RouteBook:
             pose, check = await self._site.compute(lambda: _check(world, goal))
             if not check.is_ok:
                 return check
-            drive = await drives.start(pose, place=goal.title, ticket=ticket, client=client)
+            drive = await drives.start(pose, place=goal.title, ticket=ticket)
         self._goal_id = drive.goal_id
         return None
 

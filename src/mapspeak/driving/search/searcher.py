@@ -125,7 +125,6 @@ class Searcher:
         *,
         wait_s: float,
         on_trip: OnProgress,
-        client: str = "",
         earlier: Sequence[TakenPicture] = (),
     ) -> SearchProgress:
         """Search until there is something to look at, it ends, or `wait_s` has passed.
@@ -147,7 +146,7 @@ class Searcher:
                 seen_before = self._judged.get(key, ())
                 self._begin(thing, read_earlier(earlier, thing, judged=seen_before))
             self._take_in(judgement)
-            return await self._advance(judgement, budget, wait_s, on_trip, client)
+            return await self._advance(judgement, budget, wait_s, on_trip)
 
     def _take_in(self, judgement: Judgement) -> None:
         if judgement.is_seen is False and self._reported is not None:
@@ -161,7 +160,7 @@ class Searcher:
         self._has_new_opinion = bool(judgement.scores) or judgement.likely is not None
 
     async def _advance(
-        self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnProgress, client: str
+        self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnProgress
     ) -> SearchProgress:
         self._budget, self._label = budget, None
         if judgement.is_seen:
@@ -170,22 +169,20 @@ class Searcher:
         deadline_s = self._site.robot.now_s + wait_s
         ended = None
         while ended is None:
-            ended = await self._step(deadline_s, on_trip, client)
+            ended = await self._step(deadline_s, on_trip)
             # A simulation that is begun anew sets its clock back.
             if ended is None and not -wait_s <= self._site.robot.now_s - deadline_s < -SLACK_S:
                 ended = SearchState.DRIVING
         return await self._end(ended)
 
-    async def _step(
-        self, deadline_s: float, on_trip: OnProgress, client: str
-    ) -> SearchState | None:
+    async def _step(self, deadline_s: float, on_trip: OnProgress) -> SearchState | None:
         """Drive on for a moment; return how the call ends, None where it goes on."""
         with self._site.drives.preparing() as ticket:
             world = await self._site.fetch_world_model()
             if self._find_spent() is not None:
                 await self._trips.give_up()
                 return SearchState.BUDGET_SPENT
-            state = await self._set_out(world, ticket, client)
+            state = await self._set_out(world, ticket)
         if state is TripState.UNDER_WAY:
             state = await self._trips.follow(until_s=deadline_s, grid=world.grid, on_trip=on_trip)
         match state:
@@ -207,7 +204,7 @@ class Searcher:
             self._visited.add(here.name)
         return SearchState.LOOK
 
-    async def _set_out(self, world: WorldModel, ticket: int, client: str) -> TripState | None:
+    async def _set_out(self, world: WorldModel, ticket: int) -> TripState | None:
         """Set out to the next place where there is no trip, or it has become pointless."""
         trip, here = self._trips.current, self._here
         if (
@@ -237,7 +234,7 @@ class Searcher:
             await self._trips.give_up()
             return TripState.ARRIVED
         target = Target(id=best.id, pose=best.pose, frontier=best.frontier)
-        return await self._trips.set_out(target, ticket=ticket, client=client, grid=world.grid)
+        return await self._trips.set_out(target, ticket=ticket, grid=world.grid)
 
     def _find_candidates(self, world: WorldModel) -> list[SearchCandidate]:
         self._recall_context(world)

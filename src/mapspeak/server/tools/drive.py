@@ -14,7 +14,7 @@ from mapspeak.errors import GoalError, LinkError
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.places.relations.viewpoints import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
-from mapspeak.safety import ApprovalScope, within_scope
+from mapspeak.safety import ApprovalScope, current_caller, within_scope
 from mapspeak.server.reports.robot import DriveAnswer
 from mapspeak.server.text.offered import lead, say_error
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
@@ -23,7 +23,6 @@ from mapspeak.server.text.world.drives import not_stopped, say_cause
 from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
-    client_of,
     tell_progress,
 )
 from mapspeak.server.tools.places import OnePlace
@@ -118,7 +117,6 @@ class DriveTools:
                     goal.pose,
                     place=goal.title,
                     ticket=ticket,
-                    client=client_of(context),
                     purpose=goal.purpose,
                 )
         return await self._wait(context, drive.goal_id, wait_s)
@@ -166,7 +164,7 @@ class DriveTools:
         until_s = robot.now_s + wait_s
         report = await self._session.drives.wait(goal_id, wait_s=wait_s, on_progress=on_progress)
         drive = report.drive
-        if wait_s > 0 and drive.client == client_of(context):
+        if wait_s > 0 and drive.caller.owner == current_caller().owner:
             left_s = max(until_s - robot.now_s, 0.0)
             with _scope_of(drive.place, drive.purpose):
                 report = await end_for_picture(
@@ -201,7 +199,6 @@ class ViewTools:
                     goal.pose,
                     place=f"a view of {goal.title}",
                     ticket=ticket,
-                    client=client_of(context),
                 )
                 report = await session.drives.wait(
                     drive.goal_id, wait_s=wait_s, on_progress=tell_progress(context)
@@ -273,7 +270,6 @@ class ViewTools:
             yaw_rad,
             wait_s=wait_s,
             on_progress=tell_progress(context),
-            client=client_of(context),
         )
 
 

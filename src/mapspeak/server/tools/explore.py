@@ -24,7 +24,6 @@ from mapspeak.server.text.wording import shorten
 from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
-    client_of,
     tell_progress,
 )
 from mapspeak.server.tools.sightings import CameraSighting, look_ahead
@@ -129,7 +128,7 @@ class ExploreTools:
             self._require_camera()
         with within_scope(_exploring(bounds)):
             progress = await self._explorer.advance(
-                bounds, wait_s=wait_s, on_trip=tell_progress(context), client=client_of(context)
+                bounds, wait_s=wait_s, on_trip=tell_progress(context)
             )
         sees = progress.state is ExplorationState.AT_GOAL or (
             stops_at_goals and progress.state is ExplorationState.BOUND_REACHED
@@ -164,7 +163,6 @@ class ExploreTools:
                 Budget(n_looks=max_looks, driven_m=max_m),
                 wait_s=wait_s,
                 on_trip=tell_progress(context),
-                client=client_of(context),
                 earlier=await self._session.compute(lambda: self._find_earlier(thing)),
             )
         if not standing.state.shows_picture:

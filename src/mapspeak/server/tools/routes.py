@@ -16,7 +16,6 @@ from mapspeak.server.text.wording import shorten
 from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
-    client_of,
     tell_progress,
 )
 from mapspeak.server.tools.drive import MOST_PICTURES, ViewTools
@@ -102,7 +101,6 @@ class RouteTools:
                 wait_s=wait_s,
                 when_blocked=when_blocked,
                 on_progress=tell_progress(context),
-                client=client_of(context),
             )
             robot = self._session.robot
             sees = progress.state is RouteState.AT_STOP and robot.description.has_camera

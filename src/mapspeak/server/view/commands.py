@@ -98,6 +98,7 @@ class PersonCommands:
         self._feed = feed
         self._session = feed.session
         self._client = f"{person} {AT_PAGE}"
+        self._caller = Caller(client=self._client, tool="live page", session=self._client)
 
     async def carry_out(self, name: str, body: Mapping[str, Any]) -> str:
         """Carry out a command by its name.
@@ -108,7 +109,7 @@ class PersonCommands:
         """
         model, act = self.by_name[name]
         wanted = model.model_validate(body)
-        with calling(Caller(client=self._client, tool="live page")), offering(()):
+        with calling(self._caller), offering(()):
             return await act(wanted)
 
     @property
@@ -193,9 +194,7 @@ class PersonCommands:
         self._feed.people.add(self._client)
         with session.client_is_heard(), session.drives.preparing() as ticket:
             goal = await session.find_goal(place=None, x=target.x, y=target.y, yaw_deg=None)
-            drive = await session.drives.start(
-                goal.pose, place=goal.title, ticket=ticket, client=self._client
-            )
+            drive = await session.drives.start(goal.pose, place=goal.title, ticket=ticket)
         return f"{drive.goal_id} to {drive.place} has begun."
 
     # --- the memory ------------------------------------------------------------------------------

@@ -118,7 +118,7 @@ class ViewFeed:
     def _hear_person(self) -> None:
         """Keep a drive alive that a person began here, while a page is open; no other drive."""
         drive = self.session.drives.under_way
-        if self._pages and drive is not None and drive.client in self.people:
+        if self._pages and drive is not None and drive.caller.owner in self.people:
             with self.session.client_is_heard():
                 pass
 

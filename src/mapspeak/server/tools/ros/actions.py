@@ -3,7 +3,6 @@
 from typing import Annotated, Any
 
 import anyio
-from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import LinkError
@@ -12,7 +11,7 @@ from mapspeak.server.text.ros.listening import list_page, say_loss
 from mapspeak.server.text.ros.outcomes import NO_TYPE_TOLD, ONE_OF_BOTH, say_goal, say_goals
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.wording import say_count
-from mapspeak.server.tools.caller import LONGEST_WAIT_S, client_of
+from mapspeak.server.tools.caller import LONGEST_WAIT_S
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.publishing import check_frames
@@ -76,7 +75,6 @@ class ActionTools:
     )
     async def ros_send_goal(
         self,
-        context: Context,
         action: Action,
         fields: GoalFields,
         wait_s: Wait = 5.0,
@@ -93,10 +91,7 @@ class ActionTools:
         described = await self._inquiry.describe(type_name, kind="action")
         goal = described.check(fields)
         await check_frames(self._inquiry, goal)
-        client = client_of(context)
-        job = await self._goals.send(
-            name, goal, described=described, client=client, n_stops=n_stops
-        )
+        job = await self._goals.send(name, goal, described=described, n_stops=n_stops)
         try:
             await self._goals.wait(job, wait_s=wait_s)
         except anyio.get_cancelled_exc_class():

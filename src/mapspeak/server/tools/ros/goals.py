@@ -9,6 +9,7 @@ from mapspeak.ros.actions import ActionClient, open_action
 from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.definitions.types import Field
 from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.safety import current_caller
 from mapspeak.server.text.ros.outcomes import refuse_goal
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry
 from mapspeak.server.tools.ros.publishing import Publisher
@@ -55,7 +56,6 @@ class ActionBook:
         goal: Message,
         *,
         described: Described,
-        client: str = "",
         n_stops: int | None = None,
     ) -> TrackedGoal:
         """Send a goal, and wait until the action server has taken or refused it.
@@ -64,7 +64,6 @@ class ActionBook:
             action: Its full name.
             goal: Fits its type.
             described: The type of the action.
-            client: The client that sends it: when that client is gone, the goal ends.
             n_stops: The number of stops when the goal was requested.
 
         Raises:
@@ -75,7 +74,8 @@ class ActionBook:
         connection = self._inquiry.connection
         for topic, topic_type in opened.advertise(connection).items():
             await self._publisher.prepare(topic, topic_type)
-        sent = await opened.send(goal, through=connection, owner=client, n_stops=n_stops)
+        owner = current_caller().owner
+        sent = await opened.send(goal, through=connection, owner=owner, n_stops=n_stops)
         self._n_sent += 1
         job = TrackedGoal(
             handle=f"A{self._n_sent}",

@@ -11,9 +11,10 @@ from mcp_types import Tool as ListedTool
 
 from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import quote
+from mapspeak.safety import current_caller
 from mapspeak.server.text.offered import say_error
 from mapspeak.server.text.skills import describe_skill
-from mapspeak.server.tools.caller import LONGEST_WAIT_S, client_of
+from mapspeak.server.tools.caller import LONGEST_WAIT_S
 from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter
@@ -118,7 +119,7 @@ class SkillBoard:
             run = await self.runs.begin(
                 skill,
                 own,
-                client="" if context is None else client_of(context),
+                client=current_caller().session,
                 wait_s=wait_s,
                 on_news=None if context is None else tell_news(context),
             )
