@@ -21,8 +21,8 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
 from mapspeak.robot import GoalState
-from mapspeak.session import Session
 from mapspeak.safety import Caller, calling
+from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import NOTHING_TRIED, FrontierReport
 from mapspeak.worldmodel.model import WorldModel

@@ -9,6 +9,7 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError, SkillError
+from mapspeak.safety import current_caller
 from mapspeak.skill import (
     Arguments,
     Skill,
@@ -18,6 +19,7 @@ from mapspeak.skill import (
     SkillProgress,
     SkillState,
 )
+from mapspeak.skills.missiontree import Mission
 from mapspeak.skills.questions import QuestionBook
 
 MOST_KEPT = 200
@@ -37,7 +39,7 @@ class SkillRun:
 
     Attributes:
         handle: Its name for the model, such as "S1".
-        client: Its owner; it ends when that client is gone. None for a run that is nobody's.
+        client: It ends when that client is gone; None for a mission, which goes on.
         n_stops_before: The count of stops when it began.
         progress: The latest; None before the first.
         outcome: None while it goes on, and where it could not be begun.
@@ -183,7 +185,6 @@ class SkillRuns:
         skill: Skill,
         arguments: Arguments,
         *,
-        client: str | None = None,
         wait_s: float,
         on_news: OnNews | None = None,
     ) -> SkillRun:
@@ -202,6 +203,7 @@ class SkillRuns:
             )
         self._n_begun += 1
         handle, n_stops = f"S{self._n_begun}", self._count_stops()
+        client = None if isinstance(skill, Mission) else current_caller().session
         run = SkillRun(handle, skill, client=client, n_stops_before=n_stops)
         over = [each.handle for each in self._runs.values() if each.is_over]
         for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:

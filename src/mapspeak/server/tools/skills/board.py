@@ -11,7 +11,6 @@ from mcp_types import Tool as ListedTool
 
 from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import quote
-from mapspeak.safety import current_caller
 from mapspeak.server.text.offered import say_error
 from mapspeak.server.text.skills import describe_skill
 from mapspeak.server.tools.caller import LONGEST_WAIT_S
@@ -119,7 +118,6 @@ class SkillBoard:
             run = await self.runs.begin(
                 skill,
                 own,
-                client=current_caller().session,
                 wait_s=wait_s,
                 on_news=None if context is None else tell_news(context),
             )
