@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Awaitable, Callable, Generator
+from collections.abc import Awaitable, Callable, Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
@@ -14,6 +14,7 @@ import anyio.to_thread
 
 from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drive import DriveBook
+from mapspeak.driving.drivereport import Drive
 from mapspeak.driving.episodewriter import EpisodeWriter, Keeping
 from mapspeak.driving.exploration.blocked import FrontierTries
 from mapspeak.driving.lease import Lease
@@ -118,7 +119,8 @@ class Session:
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self.keeper, self._lease = self.memory.keeper, Lease(lease_s)
         self.world: WorldModel | None = None
-        self._tries, self._looked_s, self._learned_from = FrontierTries(), 0.0, ""
+        self._tries, self._looked_s = FrontierTries(), 0.0
+        self._learned: frozenset[str] = frozenset()
         self._ranking, self._revising = threading.Lock(), anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
@@ -166,9 +168,12 @@ class Session:
             recall = self._recall if needs_memory else self._recall_if_possible
             memory = await self.compute(partial(recall, grid))
             revision, warnings = await self._revise(grid)
-            if await self._learn(revision):
+            ended = self.drives.ended
+            news = [each for each in ended if each.goal_id not in self._learned]
+            if await self._learn_doors(news, revision):
                 revision, warnings = await self._revise(grid)
-            await self.compute(lambda: self._tries.learn(self.drives.ended, revision, stamped.pose))
+            await self.compute(lambda: self._tries.learn(news, revision, stamped.pose))
+            self._learned = frozenset(each.goal_id for each in ended)
             self.world = WorldModel(
                 grid,
                 stamped.pose,
@@ -299,18 +304,18 @@ class Session:
         others = () if self.guard is None else self.guard.warn_of_servers()
         return revision, (*others, *await self.compute(lambda: reviser.describe(revision)))
 
-    async def _learn(self, revision: MapRevision) -> bool:
-        """Remember what the last drive tells of doors; true when that changes ways."""
-        drive, wall_time = next(reversed(self.drives.ended), None), self.find_wall_time()
-        if drive is None or wall_time is None or drive.goal_id == self._learned_from:
+    async def _learn_doors(self, news: Sequence[Drive], revision: MapRevision) -> bool:
+        """Remember what drives tell of doors; true when that changes ways."""
+        wall_time, changes = self.find_wall_time(), False
+        if wall_time is None:
             return False
-        self._learned_from = drive.goal_id
         try:
-            learn = partial(learn_from_drive, drive, self.memory, revision=revision, now=wall_time)
-            return bool(await self.compute(learn))
+            for drive in news:
+                learn = partial(learn_from_drive, drive, self.memory, now=wall_time)
+                changes |= bool(await self.compute(partial(learn, revision=revision)))
         except SemanticMapError as error:
-            logger.warning("What the drive tells of doors is not remembered: %s", error)
-            return False
+            logger.warning("What drives tell of doors is not remembered: %s", error)
+        return changes
 
     def recall_events(self) -> tuple[Event, ...]:
         """Return the events that are remembered; of a broken file those that were read before."""
@@ -330,7 +335,8 @@ class Session:
         self.memory.meet(grid)
         if self.keeper.n_maps != n_before:
             self.pictures.forget()
-            self._tries.forget(self.drives.ended)
+            self._tries = FrontierTries()
+            self._learned = frozenset(each.goal_id for each in self.drives.ended)
 
     def _recall_if_possible(self, grid: OccupancyGrid) -> SemanticMap:
         """Return what is remembered; a broken file costs the memory, not the map."""

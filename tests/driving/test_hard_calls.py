@@ -239,16 +239,14 @@ async def test_what_drives_on_an_older_map_have_shown_counts_no_more_on_a_new_on
 ) -> None:
     robot = FakeRobot(two_rooms())
     session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
-    tries = session._tries
     with session.drives.preparing() as ticket:
         drive = await session.drives.start(FAR, place="F1", ticket=ticket)
     await session.drives.wait(drive.goal_id, wait_s=20.0, on_progress=tell_nobody)
     world = await session.fetch_world_model()
-    assert tries.find_tried(world.map).looked_from == (FAR.point,)
+    assert session._tries.find_tried(world.map).looked_from == (FAR.point,)
     with session.drives.preparing() as ticket:
         await session.drives.start(NEAR, place="F2", ticket=ticket)
     robot.end_goal(GoalState.BLOCKED)
     robot.grid = two_rooms().crop(slice(0, 6), slice(0, 12))
     world = await session.fetch_world_model()
-    tried = tries.find_tried(world.map)
-    assert tried == NOTHING_TRIED
+    assert session._tries.find_tried(world.map) == NOTHING_TRIED

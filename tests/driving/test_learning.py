@@ -202,6 +202,30 @@ async def test_the_next_drive_knows_of_the_door_too(tmp_path: Path) -> None:
     assert [each.source for each in store.read_events()] == [ROBOT]
 
 
+async def test_a_drive_tells_of_a_door_though_another_has_ended_since(tmp_path: Path) -> None:
+    robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
+    store = SemanticMapStore(tmp_path / "places.yaml")
+    session = Session(
+        robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
+    )
+    with session.drives.preparing() as ticket:
+        drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
+    robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
+    assert drive.robot_goal_id is not None
+    robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
+    await session.drives.report()
+    with session.drives.preparing() as ticket:
+        turn = await session.drives.start(robot.pose, place="here", ticket=ticket)
+    assert turn.robot_goal_id is not None
+    robot.ended[turn.robot_goal_id] = GoalStatus(state=GoalState.ARRIVED)
+    await session.drives.report()
+
+    await session.fetch_world_model()
+    await session.fetch_world_model()
+
+    assert [each.source for each in store.read_events()] == [ROBOT]
+
+
 async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path: Path) -> None:
     robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
     store = SemanticMapStore(tmp_path / "places.yaml")

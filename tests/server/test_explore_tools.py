@@ -319,6 +319,23 @@ async def test_pictures_that_nobody_read_for_the_thing_do_not_count(tmp_path: Pa
     assert other["n_earlier"] == 0
 
 
+async def test_pictures_of_a_map_that_was_left_do_not_count_in_a_later_search(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    asked = {"thing": "sofa", "max_looks": 2, "wait_s": 25.0}
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("search_for", asked))
+        while answer["state"] != "budget_spent":
+            answer = report_of(await client.call_tool("search_for", {**asked, "seen": False}))
+        same_map = report_of(await client.call_tool("search_for", asked))
+        await client.call_tool("search_for", {**asked, "seen": True})
+        robot.grid = two_rooms().crop(slice(0, 6), slice(0, 12))
+        new_map = report_of(await client.call_tool("search_for", asked))
+    assert same_map["n_earlier"] == 2
+    assert new_map["n_earlier"] == 0
+
+
 class SofaSeeingRobot(FakeRobot):
     """A robot whose detector reports a sofa wherever it looks east of x = 5 m."""
 

@@ -136,29 +136,22 @@ def _kinds_at(grid: OccupancyGrid, points: FloatArray) -> IntArray:
 
 
 class FrontierTries:
-    """Learns from each drive once, on the map as it is after it."""
+    """Learns from drives, on the map as it is after them."""
 
     def __init__(self) -> None:
-        self._learned: set[str] = set()
         self._looked_from: list[Point] = []
         self._blocked = BlockedPlaces()
         self._gaps: list[ProvedGap] = []
 
-    def forget(self, ended: Iterable[Drive]) -> None:
-        """Begin anew on another map, of which the drives that have ended tell nothing."""
-        self._learned.update(each.goal_id for each in ended)
-        self._looked_from, self._blocked, self._gaps = [], BlockedPlaces(), []
-
     def learn(self, ended: Iterable[Drive], revision: MapRevision, robot: Pose) -> None:
-        """Take in the drives that have ended.
+        """Take in drives that have ended, each once.
 
         Args:
             robot: Where the robot is, for a drive of which it is not known where it gave up.
         """
         for drive in ended:
-            if drive.goal_id in self._learned or drive.final is None:
+            if drive.final is None:
                 continue
-            self._learned.add(drive.goal_id)
             if drive.final.state is GoalState.ARRIVED:
                 self._blocked.forget(drive.goal.point)
                 if FRONTIER.fullmatch(drive.place):

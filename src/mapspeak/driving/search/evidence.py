@@ -94,16 +94,18 @@ def read_earlier(
 
     Args:
         pictures: The oldest first.
-        judged: Looks of an earlier search for the same thing, in which a model saw none.
+        judged: Looks of an earlier search for the same thing, in which a model saw none; they
+            count while their pictures do, and so on the same map alone.
     """
     taken = list(pictures)
+    shown = {(each.pose, each.horizontal_fov_rad) for each in taken}
     read = [each for each in taken if each.reported is not None]
     labels = {label for each in read for label in each.reported or ()}
     speaking = {label for label in labels if speaks_of(label, thing)}
     found = [each for each in read if speaking.intersection(each.reported or ())]
     none = [each for each in read if each not in found]
     looks = dict.fromkeys((each.pose, each.horizontal_fov_rad) for each in none)
-    looks |= dict.fromkeys(judged)
+    looks |= dict.fromkeys(each for each in judged if each in shown)
     unread = (each for each in taken if each.reported is None)
     return Earlier(
         looks=tuple(looks),

@@ -156,6 +156,8 @@ class ExploreTools:
         lead it.
         """
         self._require_camera()
+        # Pictures of a map that was left tell nothing.
+        await self._session.meet_map()
         with within_scope(_searching(thing, max_looks, max_m)):
             standing = await self._searcher.advance(
                 thing,
