@@ -112,15 +112,13 @@ class Session:
         self.memory = FramedMemory(memory, name_robot=name_robot, lock=lock)
         self.pictures, folder = PictureBook(), memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
-        wall_clock = None if guard is None else guard.wall_clock
-        self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
+        self.episodes = EpisodeWriter(episodes, wall_clock=guard and guard.wall_clock)
         self._rank: VectorRank | None = None
         self.recollector = Recollector(find_model, kept=folder)
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self.keeper, self._lease = self.memory.keeper, Lease(lease_s)
         self.world: WorldModel | None = None
-        self._tries, self._looked_s = FrontierTries(), 0.0
-        self._learned: frozenset[str] = frozenset()
+        self._tries, self._looked_s, self._learned = FrontierTries(), 0.0, set[str]()
         self._ranking, self._revising = threading.Lock(), anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
@@ -168,12 +166,11 @@ class Session:
             recall = self._recall if needs_memory else self._recall_if_possible
             memory = await self.compute(partial(recall, grid))
             revision, warnings = await self._revise(grid)
-            ended = self.drives.ended
-            news = [each for each in ended if each.goal_id not in self._learned]
+            news = [each for each in self.drives.ended if each.goal_id not in self._learned]
             if await self._learn_doors(news, revision):
                 revision, warnings = await self._revise(grid)
             await self.compute(lambda: self._tries.learn(news, revision, stamped.pose))
-            self._learned = frozenset(each.goal_id for each in ended)
+            self._learned |= {each.goal_id for each in news}
             self.world = WorldModel(
                 grid,
                 stamped.pose,
@@ -306,16 +303,14 @@ class Session:
 
     async def _learn_doors(self, news: Sequence[Drive], revision: MapRevision) -> bool:
         """Remember what drives tell of doors; true when that changes ways."""
-        wall_time, changes = self.find_wall_time(), False
-        if wall_time is None:
+        if (now := self.find_wall_time()) is None:
             return False
+        learn = partial(learn_from_drive, store=self.memory, revision=revision, now=now)
         try:
-            for drive in news:
-                learn = partial(learn_from_drive, drive, self.memory, now=wall_time)
-                changes |= bool(await self.compute(partial(learn, revision=revision)))
+            return bool(await self.compute(lambda: [each for one in news for each in learn(one)]))
         except SemanticMapError as error:
             logger.warning("What drives tell of doors is not remembered: %s", error)
-        return changes
+            return False
 
     def recall_events(self) -> tuple[Event, ...]:
         """Return the events that are remembered; of a broken file those that were read before."""
@@ -336,7 +331,7 @@ class Session:
         if self.keeper.n_maps != n_before:
             self.pictures.forget()
             self._tries = FrontierTries()
-            self._learned = frozenset(each.goal_id for each in self.drives.ended)
+            self._learned |= {each.goal_id for each in self.drives.ended}
 
     def _recall_if_possible(self, grid: OccupancyGrid) -> SemanticMap:
         """Return what is remembered; a broken file costs the memory, not the map."""
