@@ -112,7 +112,8 @@ class Session:
         self.memory = FramedMemory(memory, name_robot=name_robot, lock=lock)
         self.pictures, folder = PictureBook(), memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
-        self.episodes = EpisodeWriter(episodes, wall_clock=guard and guard.wall_clock)
+        wall_clock = None if guard is None else guard.wall_clock
+        self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
         self._rank: VectorRank | None = None
         self.recollector = Recollector(find_model, kept=folder)
         self.drives = DriveBook(self.robot, when_busy=when_busy)
@@ -209,23 +210,12 @@ class Session:
         """Keep a picture as an episode, with what the robot's detector reports in it."""
         if not self.episodes.is_open:
             return Keeping()
-        try:
+        room_id = None
+        with suppress(LinkError, MapError):
             room_id = await self.find_room_id(picture.pose.point)
-        except (LinkError, MapError):
-            room_id = None
-
-        def keep() -> Keeping:
-            return self.episodes.keep(
-                ObservationKind.PICTURE,
-                picture=picture.data,
-                pose=picture.pose,
-                stamp_s=picture.stamp_s,
-                labels=labels,
-                room_id=room_id,
-                name_map=self.memory.name_map,
-            )
-
-        return await self.compute(keep)
+        keep = partial(self.episodes.keep, ObservationKind.PICTURE, picture=picture.data)
+        keep = partial(keep, pose=picture.pose, stamp_s=picture.stamp_s, labels=labels)
+        return await self.compute(partial(keep, room_id=room_id, name_map=self.memory.name_map))
 
     def find_wall_time(self) -> datetime | None:
         """Return the time by the calendar; None where the operator's clock is not known."""
