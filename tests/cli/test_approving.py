@@ -37,7 +37,9 @@ def test_what_waits_is_listed_and_approved_by_its_id(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, QUEUED)
     assert "Nothing waits" in approve(tmp_path)
     request_id = request(guard)
-    assert approve(tmp_path) == f"{request_id}  publish std_msgs/msg/Bool on /lamp\n"
+    assert approve(tmp_path) == (
+        f'{request_id}  publish std_msgs/msg/Bool on /lamp: {{"data": true}}\n'
+    )
     assert "Approved: publish" in approve(tmp_path, request_id)
     assert "Nothing waits" in approve(tmp_path)
     guard.clear(LAMP, robot_s=0.0)
@@ -66,7 +68,8 @@ def test_an_id_that_nothing_waits_under_is_answered_with_what_does(tmp_path: Pat
 
 def test_what_waits_is_listed_on_one_printable_line_each(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, QUEUED)
-    guard.approvals.room.add("1-1", "drive, asked by x\n9-9  stop\x1b[2K\x1b[1G\u202eevil")
+    evil = "drive, asked by x\n9-9  stop\x1b[2K\x1b[1G\u202eevil"
+    guard.approvals.room.add("1-1", evil, server="1")
     output = approve(tmp_path)
     assert output.count("\n") == 1
     assert output.rstrip("\n").isprintable()

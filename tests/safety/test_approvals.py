@@ -9,9 +9,11 @@ from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict
 from mapspeak.safety import (
+    Act,
     Approval,
     ApprovalNeededError,
     ApprovalScope,
+    Call,
     Caller,
     Command,
     CommandKind,
@@ -134,9 +136,42 @@ def test_a_word_for_a_drive_holds_while_its_goal_stays_nearly_where_it_was(
 
 def test_who_names_what_does_not_wait_is_told_what_does(tmp_path: Path) -> None:
     room = WaitingRoom(tmp_path)
-    room.add("ab-1", "drive")
+    room.add("ab-1", "drive", server="ab")
     with pytest.raises(ConfigError) as raised:
         room.approve("ab-2")
     assert "ab-1" in raised.value.hint
     room.refuse("ab-1")
     assert room.list_waiting() == {}
+
+
+@pytest.mark.parametrize(
+    ("command", "carried"),
+    [
+        (LAMP, '{"data": "on"}'),
+        (Call(service="/lamp/set", type="", arguments={"level": 3}), '{"level": 3}'),
+        (Act(action="/arm/wave", type="a/action/Wave", goal={"times": 2}), '{"times": 2}'),
+        (Publish(topic="/a", type="", message={"data": "x" * 2_000}), "(of 2,012 characters)"),
+    ],
+)
+def test_a_person_is_told_what_a_command_carries(
+    tmp_path: Path, command: Command, carried: str
+) -> None:
+    kinds = frozenset(CommandKind)
+    policy = Policy(approval=Approval(kinds=kinds, otherwise=Otherwise.QUEUE))
+    guard = make_guard(tmp_path, policy)
+    with pytest.raises(ApprovalNeededError) as raised:
+        guard.clear(command, robot_s=0.0)
+    (waiting,) = guard.approvals.room.list_waiting().values()
+    assert carried in raised.value.question
+    assert carried in waiting
+
+
+def test_a_word_for_an_earlier_server_is_no_word_for_this_one(tmp_path: Path) -> None:
+    """Servers share a folder, and what was approved for one that has crashed stays there."""
+    policy = Policy(approval=Approval(kinds=KINDS, otherwise=Otherwise.QUEUE))
+    servers = [make_guard(tmp_path, policy) for _ in range(2)]
+    for each in servers:
+        each.approvals._server = f"ab12{each.approvals._server}"
+    servers[0].approvals.room.approve(ask(servers[0], LAMP))
+    ask(servers[1], drive())
+    ask(servers[1], drive())

@@ -77,6 +77,14 @@ def test_a_last_line_that_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:
     assert len(audit_of(tmp_path)) == 1
 
 
+def test_a_line_that_was_cut_off_costs_none_of_those_before_and_after_it(tmp_path: Path) -> None:
+    make_guard(tmp_path).clear(publish("on"), robot_s=1.0)
+    with (tmp_path / "audit.jsonl").open("a", errors="surrogateescape") as file:
+        file.write('{"number": 2, "said": "gr\udcc3')
+    make_guard(tmp_path).clear(publish("off"), robot_s=2.0)
+    assert [line.robot_s for line in audit_of(tmp_path)] == [1.0, 2.0]
+
+
 @pytest.mark.parametrize("text", ["hello\nworld\n", "[]\n{}\n", '{"a": 1}\n{"b": 2}\n'])
 def test_a_file_that_is_no_log_is_named_with_its_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "other.txt"

@@ -189,6 +189,25 @@ def test_a_pose_that_localisation_corrects_is_no_speed() -> None:
     assert watch(Pose(4.9, 1.0, 0.0), now_s=0.2) is not None
 
 
+def test_a_robot_whose_clock_was_set_back_is_stopped_early_enough_to_brake() -> None:
+    watch = watching()
+    assert watch(Pose(1.0, 1.0, 0.0), now_s=9_000.0) is None
+    told = [watch(Pose(3.0 + 0.1 * look, 1.0, 0.0), now_s=5.0 + 0.1 * look) for look in range(15)]
+    assert next(look for look, fault in enumerate(told) if fault) <= 12
+
+
+def test_a_pose_that_is_told_again_is_no_new_one_though_it_is_silent_for_longer() -> None:
+    """A robot of 1.2 m/s whose frames come twice a second, and that is looked at ten times."""
+    monitor = KeepOutMonitor()
+    for look in range(30):
+        n_frames, n_since = divmod(look, 5)
+        pose = Pose(1.8 + 0.6 * n_frames, 1.0, 0.0)
+        stamped = StampedPose(pose, 0.5 * n_frames, silent_s=0.1 * n_since)
+        if monitor.judge(FLOOR, stamped, now_s=0.1 * look, mover=Mover.OTHERS):
+            break
+    assert pose.x <= 3.6
+
+
 @pytest.mark.parametrize("mover", Mover)
 def test_who_is_told_of_a_stop_is_told_what_drove_the_robot(mover: Mover) -> None:
     monitor = KeepOutMonitor()

@@ -66,6 +66,7 @@ class Wheels:
     def __init__(self, robot: WheeledRobot) -> None:
         self.robot = robot
         self.heard: list[Any] = []
+        self.is_closed = False
 
     def advertise(self, topic: str, *, type_name: str, is_latched: bool = False) -> None:
         assert not is_latched
@@ -77,6 +78,8 @@ class Wheels:
 
     def publish_everywhere(self, topic: str, message: Any) -> int:  # noqa: ANN401
         assert topic
+        if self.is_closed:
+            raise LinkError("It was not advertised.", hint="Advertise it first.")
         self.heard.append(message)
         if "linear" in message:
             self.robot.velocity = message
@@ -220,7 +223,7 @@ async def test_a_robot_that_goes_on_by_itself_is_stopped_before_the_area(tmp_pat
     await stand.publish(twist(0.5))
     await stand.session.robot.sleep(20.0)
     assert stand.robot.n_stops == 1
-    assert stand.wheels.heard[-1] == twist()
+    assert stand.robot.velocity == twist()
     edge_m = PIT.outline[0].x - stand.robot.pose.x - RADIUS_M
     assert 0.05 <= edge_m <= 0.5
     said = audit_of(tmp_path)[-1].said
@@ -250,3 +253,41 @@ async def test_what_is_no_velocity_is_none_of_the_areas_business(tmp_path: Path)
     stand.robot.is_lost = True
     await stand.publish({"data": "hello"})
     assert stand.wheels.heard == [{"data": "hello"}]
+
+
+async def test_a_velocity_that_was_refused_does_not_count_as_moving_the_robot(
+    tmp_path: Path,
+) -> None:
+    stand = Stand(tmp_path, PIT)
+    with pytest.raises(PolicyError, match="above the limit"):
+        await stand.publish(twist(-2.0))
+    stand.robot.velocity = twist(0.4)
+    await stand.session.robot.sleep(20.0)
+    assert "others_at_area" in audit_of(tmp_path)[-1].said
+
+
+async def test_a_robot_is_stopped_though_a_topic_of_velocities_takes_nothing_any_more(
+    tmp_path: Path,
+) -> None:
+    stand = Stand(tmp_path, PIT)
+    await stand.publish(twist(0.1))
+    stand.wheels.is_closed = True
+    await stand.session.robot.stop()
+    assert stand.robot.n_stops == 1
+
+
+async def test_a_robot_that_goes_on_by_a_velocity_and_is_lost_is_stopped(tmp_path: Path) -> None:
+    stand = Stand(tmp_path, PIT)
+    await stand.publish(twist(0.1))
+    stand.robot.is_lost = True
+    await stand.session.robot.sleep(1.0)
+    assert stand.robot.n_stops
+    assert "pose_unknown" in audit_of(tmp_path)[-1].said
+
+
+@pytest.mark.parametrize("speed", [1e200, -1e308, 10**400])
+async def test_a_velocity_beyond_all_numbers_is_above_the_limit(
+    tmp_path: Path, speed: float
+) -> None:
+    with pytest.raises(PolicyError, match="above the limit"):
+        await Stand(tmp_path, PIT).publish(twist(speed))

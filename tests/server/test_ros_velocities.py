@@ -42,6 +42,19 @@ async def test_a_second_velocity_is_refused_while_the_first_moves_the_robot(
     assert "until the robot was stopped, then a stand on /cmd_vel." in said[0]
 
 
+async def test_a_velocity_on_another_topic_is_refused_too(tmp_path: Path) -> None:
+    scripted, said = ScriptedRobot(), list[str]()
+    scripted.topics["/cmd_vel_teleop"] = "geometry_msgs/msg/Twist"
+    async with on_script(scripted, tmp_path) as caller, anyio.create_task_group() as tasks:
+        tasks.start_soon(move, caller, said)
+        await scripted.until(lambda: is_moving(scripted))
+        second = await caller.refuse(
+            "ros_publish", topic="/cmd_vel_teleop", fields=FORWARD, duration_s=1
+        )
+        await caller.ask("stop_robot")
+    assert "Another publication moves the robot on /cmd_vel for 1" in second
+
+
 async def test_a_velocity_is_refused_during_a_drive_of_our_own(tmp_path: Path) -> None:
     async with on_our_server(Dialect.ROS2, tmp_path) as (_, caller):
         await caller.ask("navigate_to", x=2.0, y=1.0, wait_s=0)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mapspeak.errors import ConfigError
 from mapspeak.memory.quoting import clean_line
-from mapspeak.safety.commands import Command, is_same, say_command
+from mapspeak.safety.commands import Command, is_same, say_whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,10 +154,11 @@ class WaitingRoom:
 
     folder: Path
 
-    def add(self, request_id: str, said: str) -> None:
-        """Write a command that waits."""
+    def add(self, request_id: str, said: str, *, server: str) -> None:
+        """Write a command that waits, and for which server: ids of two servers may be the same."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._file(request_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
+        written = json.dumps({"what": said, "server": server})
+        self._file(request_id, "waiting").write_text(written, encoding="utf-8")
 
     def list_waiting(self) -> dict[str, str]:
         """Return what waits, each on one line, by its id."""
@@ -190,13 +191,16 @@ class WaitingRoom:
         self._file(request_id, "waiting").unlink(missing_ok=True)
         return said
 
-    def take_approved(self, request_id: str) -> bool:
-        """Return whether a command was approved; once."""
+    def take_approved(self, request_id: str, *, server: str) -> bool:
+        """Return whether a command of a server was approved; once."""
+        approved = self._file(request_id, "approved")
         try:
-            self._file(request_id, "approved").unlink()
-        except OSError:
+            is_ours = bool(json.loads(approved.read_text(encoding="utf-8"))["server"] == server)
+            if is_ours:
+                approved.unlink()
+        except (OSError, ValueError, KeyError, TypeError):
             return False
-        return True
+        return is_ours
 
     def _require_waiting(self, request_id: str) -> str:
         waiting = self.list_waiting()
@@ -230,7 +234,7 @@ class Approvals:
     _asked: set[str] = field(default_factory=set)
     _granted: set[str] = field(default_factory=set)
     _n_requests: int = 0
-    _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
+    _server: str = field(default_factory=lambda: secrets.token_hex(16))
 
     def ask(self, wanted: Wanted, *, client: str) -> str:
         """Note a request and return its id; the same one for the same request."""
@@ -239,7 +243,7 @@ class Approvals:
             if _is_of(known, wanted, client):
                 return known.id
         self._n_requests += 1
-        request_id = f"{self._prefix}-{self._n_requests}"
+        request_id = f"{self._server[:4]}-{self._n_requests}"
         self._requests[request_id] = _Request(
             id=request_id, wanted=wanted, client=client, asked_s=self.now_s()
         )
@@ -254,7 +258,7 @@ class Approvals:
         """Let a request wait for `mapspeak approve`."""
         request = self._requests[request_id]
         who = f", asked by {request.client}" if request.client else ""
-        self.room.add(request_id, f"{_say(request.wanted)}{who}")
+        self.room.add(request_id, f"{_say(request.wanted)}{who}", server=self._server)
 
     def ask_client(self, request_id: str) -> str:
         """Note that the client is asked now, and return the secret that its answer must know."""
@@ -278,7 +282,8 @@ class Approvals:
         for request in list(self._requests.values()):
             if not _is_of(request, wanted, client):
                 continue
-            if request.id in self._granted or self.room.take_approved(request.id):
+            is_granted = request.id in self._granted
+            if is_granted or self.room.take_approved(request.id, server=self._server):
                 self._forget(request.id)
                 return request.id
         return None
@@ -309,4 +314,4 @@ def _is_of(request: _Request, wanted: Wanted, client: str) -> bool:
 
 
 def _say(wanted: Wanted) -> str:
-    return wanted.said if isinstance(wanted, ApprovalScope) else say_command(wanted)
+    return wanted.said if isinstance(wanted, ApprovalScope) else say_whole(wanted)

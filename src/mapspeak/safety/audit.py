@@ -60,6 +60,8 @@ def calling(caller: Caller) -> Generator[None]:
         _CALLER.reset(token)
 
 
+BEGIN, ENDS = '{"number": ', (b"\n", b"")
+"""How each line begins, and what lies before one: the end of another, or nothing."""
 MOST_CHARACTERS = 2_000
 """The most characters kept of one argument; a cut is marked."""
 
@@ -163,9 +165,10 @@ class AuditLog:
         """Write a whole line or raise: opened anew, so that a file that was moved is noticed."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
-            descriptor = os.open(self.path, flags, 0o600)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o600)
             try:
+                if os.pread(descriptor, 1, max(os.fstat(descriptor).st_size - 1, 0)) not in ENDS:
+                    line = b"\n" + line
                 n_written = os.write(descriptor, line)
                 self._begin_anew_if_large(descriptor)
             finally:
@@ -192,15 +195,15 @@ class AuditLog:
 
 
 def read_audit(path: Path) -> Iterator[AuditLine]:
-    """Read a log, line by line; a last line that was cut off by a crash is left out.
+    """Read a log, line by line; lines that a crash or a full disk has cut off are left out.
 
     Raises:
         ConfigError: The file cannot be read, or is not an audit log.
     """
     try:
         # Only a line feed ends a line here; what people publish may hold other signs for it.
-        lines = path.read_text(encoding="utf-8").removesuffix("\n").split("\n")
-    except (OSError, UnicodeDecodeError) as error:
+        lines = path.read_text(encoding="utf-8", errors="replace").removesuffix("\n").split("\n")
+    except OSError as error:
         raise ConfigError(
             f"{path} cannot be read: {say_cause(error)}.", hint="Give the file of an audit log."
         ) from error
@@ -208,8 +211,8 @@ def read_audit(path: Path) -> Iterator[AuditLine]:
         try:
             yield AuditLine(**json.loads(line))
         except (TypeError, ValueError) as error:
-            if number == len(lines):
-                return
+            if isinstance(error, ValueError) and line[: len(BEGIN)] == BEGIN[: len(line)]:
+                continue
             raise ConfigError(
                 f"{path}, line {number} is not a line of an audit log.",
                 hint="Give the file that was named with --audit.",

@@ -1,5 +1,6 @@
 """Commands that move the robot or change something, as values to judge."""
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,12 +8,15 @@ from enum import StrEnum
 from typing import Any
 
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.memory.quoting import clean_line
 from mapspeak.places.goalcheck import GoalCheck
 
 SAME_GOAL_M = 0.1
 """An approved goal stays approved while a changing map moves it by no more than this."""
 SAME_GOAL_RAD = math.radians(10)
 MOST_SHOWN = 200
+MOST_CARRIED = 1_000
+"""The most characters that a person reads of what a command carries."""
 
 Message = Mapping[str, Any]
 
@@ -133,6 +137,17 @@ def say_command(command: Command) -> str:
             is_deleted = command.value is None
             verb = "delete" if is_deleted else "set"
             return f"{verb} {command.full_name}{'' if is_deleted else value}"
+
+
+def say_whole(command: Command) -> str:
+    """Return a command in words with what it carries: a person agrees to no less."""
+    match command:
+        case Publish(message=carried) | Call(arguments=carried) | Act(goal=carried):
+            text = clean_line(json.dumps(carried, ensure_ascii=False, default=str))
+            cut = f"... (of {len(text):,} characters)" if len(text) > MOST_CARRIED else ""
+            return f"{say_command(command)}: {text[:MOST_CARRIED]}{cut}"
+        case _:
+            return say_command(command)
 
 
 def read_action_goal(command: Publish) -> Act | None:

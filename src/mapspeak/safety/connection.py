@@ -24,7 +24,6 @@ from mapspeak.safety.teleop import (
     Teleop,
     is_zero_velocity,
     refuse_velocity,
-    zero_velocity_of,
 )
 
 T = TypeVar("T")
@@ -86,10 +85,7 @@ class GuardedConnection:
             await self._send(goal, self._connection.publish(topic, message))
             return
         objection = await self._teleop.find_objection(message) if self._teleop else None
-        done = self._connection.publish(topic, message)
-        # From before it is sent: what fails half-way may move the robot all the same.
-        self._watch_over(command, objection)
-        await self._guarded(command, done, objection)
+        await self._guarded(command, self._connection.publish(topic, message), objection)
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
         """Publish at once by every way that is open, and return how many: for a stop.
@@ -187,17 +183,6 @@ class GuardedConnection:
         """Return True when the policy denies a command for its name; nothing is noted."""
         return is_name_denied(command, self._guard.policy)
 
-    def _watch_over(self, command: Publish, objection: Refused | None) -> None:
-        """Let the robot be watched that is about to be driven by a velocity."""
-        is_velocity = _is_velocity(command.type)
-        if self._teleop is None or objection is not None or not is_velocity:
-            return
-        zero = zero_velocity_of(command.message)
-        self._teleop.begin(
-            command.topic,
-            publish_zero=lambda: self._connection.publish_everywhere(command.topic, zero),
-        )
-
     def _objection_unseen(self, command: Publish) -> Refused | None:
         """Return the objection to a velocity when there is no time to fetch the pose."""
         is_free = self._teleop is None or not self._teleop.knows_areas
@@ -214,6 +199,9 @@ class GuardedConnection:
         except BaseException:
             work.close()
             raise
+        # From before it is sent: what fails half-way may move the robot all the same.
+        if self._teleop and isinstance(command, Publish) and _is_velocity(command.type):
+            self._teleop.begin(command.topic)
         said = "given up"
         try:
             result = await work

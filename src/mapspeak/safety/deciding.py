@@ -20,6 +20,7 @@ from mapspeak.safety.commands import (
     RunSkill,
     SetParameter,
     say_command,
+    say_whole,
 )
 from mapspeak.safety.policy import RATE_KEYS, Policy
 
@@ -99,7 +100,7 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
         return refused
     needs_word = isinstance(command, RunSkill) and command.needs_word
     if (needs_word or command.kind in policy.approval.kinds) and not situation.is_approved:
-        return NeedsApproval(question=f"May the robot {say_command(command)}?")
+        return NeedsApproval(question=f"May the robot {say_whole(command)}?")
     return Allowed()
 
 
@@ -223,7 +224,7 @@ def find_speeds(value: object, depth: int = 0) -> Iterator[tuple[str, float]]:
 
 
 def _length_of(vector: Mapping[str, Any]) -> float:
-    return math.sqrt(sum(read_number(part) ** 2 for part in vector.values()))
+    return math.hypot(*map(read_number, vector.values()))
 
 
 def read_number(value: object) -> float:

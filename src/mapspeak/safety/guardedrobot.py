@@ -305,7 +305,7 @@ class GuardedRobot:
     async def _find_fault(self, mover: Mover) -> Cause | None:
         """Return why the robot must not go on; that nothing can be seen is a reason after a while.
 
-        The blind robot is stopped on a drive of ours only: what others do with it is not known.
+        The blind robot is stopped only when we drive it: what others do with it is not known.
         """
         revision = self._reviser.latest
         if revision is None or not revision.areas:
@@ -314,7 +314,7 @@ class GuardedRobot:
             here = await self._robot.fetch_pose()
         except LinkError as error:
             blind_s = anyio.current_time() - self._seen_at_s
-            if mover is not Mover.NAVIGATION or blind_s < BLIND_S:
+            if mover is Mover.OTHERS or blind_s < BLIND_S:
                 return None
             return Cause(code=CauseCode.POSE_UNKNOWN, after_s=blind_s, quote=str(error))
         self._seen_at_s = anyio.current_time()
@@ -340,8 +340,8 @@ class GuardedRobot:
         await self._end(self._drive, GoalState.CANCELLED, cause)
 
     async def _repeat_stop(self) -> None:
-        self.teleop.stand()
         await self._robot.stop()
+        self.teleop.end_all()
         self._is_stop_owed = False
 
     async def _stop(self, why: str) -> None:

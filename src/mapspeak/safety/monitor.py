@@ -116,13 +116,15 @@ class KeepOutMonitor:
         if before is None:
             return ()
         passed_s = now_s - before[1]
-        if passed_s < LEAST_STEP_S or stamped == before[0]:
+        is_told_again = (stamped.pose, stamped.stamp_s) == (before[0].pose, before[0].stamp_s)
+        # A clock that was set back has not run backwards: the look before is of no use.
+        if 0.0 <= passed_s < LEAST_STEP_S or is_told_again:
             # The pose that is told next may be older than one look.
             self._before = before
             return ()
         then, here = before[0].pose, stamped.pose
         moved_m = then.point.distance_to(here.point)
-        if passed_s > LOST_TRACK_S or moved_m <= WAVER_M:
+        if not 0.0 < passed_s <= LOST_TRACK_S or moved_m <= WAVER_M:
             return ()
         speed_mps = moved_m / passed_s
         if speed_mps > CORRECTED_MPS:

@@ -1,7 +1,7 @@
 """Published velocities: where they would take the robot, and whether it may go there."""
 
 import math
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -19,6 +19,8 @@ from mapspeak.safety.planning import Planner
 
 LEAST_S = 0.5
 """How long one message moves the robot: about as long as base drivers wait for the next."""
+FASTEST = 1_000.0
+"""In m/s or rad/s, more than a policy allows."""
 STEP_M = 0.05
 MOST_STEPS = 400
 
@@ -45,7 +47,6 @@ class Teleop:
         self._robot = robot
         self._planner = planner
         self._reviser = reviser
-        self._zeros: dict[str, Callable[[], object]] = {}
         self._moving: set[str] = set()
 
     @property
@@ -75,20 +76,17 @@ class Teleop:
             )
         return self._find_objection(message, here)
 
-    def begin(self, topic: str, *, publish_zero: Callable[[], object]) -> None:
-        """Note that a velocity was let go."""
-        self._zeros[topic] = publish_zero
+    def begin(self, topic: str) -> None:
+        """Note that a velocity is let go."""
         self._moving.add(topic)
 
     def end(self, topic: str) -> None:
         """Note that zero velocity was published."""
         self._moving.discard(topic)
 
-    def stand(self) -> None:
-        """Publish zero velocity on every topic on which a velocity was ever published."""
-        for topic, publish_zero in self._zeros.items():
-            publish_zero()
-            self.end(topic)
+    def end_all(self) -> None:
+        """Note that the robot was stopped."""
+        self._moving.clear()
 
     def _find_objection(self, message: Message, here: Pose) -> Refused | None:
         revision = self._reviser.latest
@@ -158,12 +156,9 @@ def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
 
 
 def _is_moving(message: Message) -> bool:
-    """Return True for a message with speeds.
-
-    NaN is refused elsewhere.
-    """
+    """Return True for a message with speeds; those that no policy allows are refused elsewhere."""
     speeds = [speed for _, speed in find_speeds(message)]
-    return any(speeds) and all(map(math.isfinite, speeds))
+    return any(speeds) and all(speed <= FASTEST for speed in speeds)
 
 
 def _read_velocity(message: Message) -> Twist | None:

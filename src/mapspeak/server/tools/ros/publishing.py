@@ -205,9 +205,10 @@ class Publisher:
             await drives.report(drives.under_way.goal_id)
         if (drive := drives.under_way) is not None:
             raise DRIVE_UNDER_WAY.error(goal_id=drive.goal_id, place=drive.place, topic=topic)
-        left_s = self._left_s(topic)
-        if left_s is not None:
-            raise PUBLICATION_UNDER_WAY.error(topic=topic, left_s=left_s)
+        # On another topic too: the base would follow one and the other by turns.
+        moving = next(iter(self._moving), None)
+        if moving is not None:
+            raise PUBLICATION_UNDER_WAY.error(topic=moving, left_s=self._left_s(moving))
 
     def _left_s(self, topic: str) -> float | None:
         """Return how long another publication moves the robot on a topic; None without one."""
