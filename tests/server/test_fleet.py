@@ -11,6 +11,7 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
+from mapspeak.safety import Caller, calling
 from mapspeak.server.app import build_server
 from mapspeak.server.fleet import FleetServer
 from mapspeak.session import Session
@@ -90,3 +91,18 @@ async def test_a_robot_that_cannot_be_stopped_holds_up_no_other_and_is_named(
 def test_a_fleet_of_none_is_refused() -> None:
     with pytest.raises(ConfigError, match="no robot"):
         FleetServer({})
+
+
+async def test_a_robot_out_of_reach_keeps_no_other_driving_when_their_client_is_gone(
+    tmp_path: Path,
+) -> None:
+    robots = {"alpha": StuckRobot(two_rooms()), "beta": FakeRobot(two_rooms())}
+    servers = {}
+    for name, robot in robots.items():
+        session = Session(robot, SemanticMapStore(tmp_path / f"{name}.yaml"), lease_s=60.0)
+        servers[name] = build_server(session)
+        with calling(Caller(session="mine")), session.drives.preparing() as ticket:
+            goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
+            await session.drives.start(goal.pose, place=goal.name, ticket=ticket)
+    await FleetServer(servers).note_hang_up("mine")
+    assert robots["beta"].n_stops == 1

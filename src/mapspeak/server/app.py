@@ -1,6 +1,7 @@
 """The MCP server around a session: chosen tools, readable errors, lean schemas."""
 
 import json
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -21,6 +22,7 @@ from mcp_types import (
 from mcp_types import Tool as ListedTool
 
 from mapspeak import __version__
+from mapspeak.errors import LinkError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.remarks import Remarks, shorten_report, show_controls_of
@@ -45,6 +47,8 @@ from mapspeak.server.wire.calllog import CallNoting
 from mapspeak.session import Session
 from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import OwnersEntry
+
+logger = logging.getLogger(__name__)
 
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
@@ -241,8 +245,9 @@ class MapspeakServer(MCPServer[Any]):
         """Stop the drive and end the skills of a client that is gone."""
         try:
             await self._session.client_is_gone(client)
-        finally:
-            await self.skills.runs.client_is_gone(client)
+        except LinkError as error:
+            logger.warning("The robot could not be stopped yet: %s", error)
+        await self.skills.runs.client_is_gone(client)
 
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None

@@ -92,9 +92,10 @@ class FleetServer(MCPServer[Any]):
         return await server.call_tool(name, own, context)
 
     async def note_hang_up(self, client: str) -> None:
-        """Stop the drives of a client that is gone."""
-        for server in self._servers.values():
-            await server.note_hang_up(client)
+        """Stop the drives of a client that is gone, those of all robots at once."""
+        async with anyio.create_task_group() as tasks:
+            for server in self._servers.values():
+                tasks.start_soon(server.note_hang_up, client)
 
     async def _stop_all(
         self, arguments: dict[str, Any], context: Context[Any, Any] | None

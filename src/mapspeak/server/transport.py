@@ -30,6 +30,8 @@ from mapspeak.server.wire.access import (
     parse_address,
 )
 
+LISTEN = b"subscriptions/listen"
+"""The method by which a client of the newer protocol asks for news."""
 HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 
 
@@ -122,7 +124,8 @@ class HangUpWatch:
     """Notices a client that is gone before its answer was, or that ends its session.
 
     A running tool does not learn of it otherwise. Clients are told apart by their session; those of
-    a protocol without sessions count as one.
+    a protocol without sessions count as one. Streams of news do not count: a client closes one and
+    opens the next as it likes. The lease ends the drives of one that is gone for good.
     """
 
     def __init__(self, app: ASGIApp, on_hang_up: Callable[[str], Awaitable[None]]) -> None:
@@ -134,7 +137,9 @@ class HangUpWatch:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        client = dict(scope["headers"]).get(b"mcp-session-id", b"").decode("latin-1")
+        headers = dict(scope["headers"])
+        client = headers.get(b"mcp-session-id", b"").decode("latin-1")
+        is_call = scope["method"] == "POST" and headers.get(b"mcp-method") != LISTEN
         is_answered = is_ended = False
 
         async def watch_send(message: Message) -> None:
@@ -142,13 +147,15 @@ class HangUpWatch:
             await send(message)
             is_body = message["type"] == "http.response.body"
             is_answered = is_answered or (is_body and not message.get("more_body", False))
-            if scope.get("method") == "DELETE" and message["type"] == "http.response.start":
+            if scope["method"] == "DELETE" and message["type"] == "http.response.start":
                 is_ended = message["status"] < HTTPStatus.BAD_REQUEST
 
         async def watch_receive() -> Message:
             message = await receive()
-            if message["type"] == "http.disconnect" and not is_answered:
-                await self._on_hang_up(client)
+            if message["type"] == "http.disconnect" and is_call and not is_answered:
+                # The stop itself may end the call, and with it this task.
+                with anyio.CancelScope(shield=True):
+                    await self._on_hang_up(client)
             return message
 
         await self._app(scope, watch_receive, watch_send)
