@@ -92,10 +92,10 @@ def test_a_period_of_the_past_is_the_whole_of_it(
 @pytest.mark.parametrize(
     ("written", "hour"),
     [
-        ("3:15 pm", 15.25),
-        ("3pm", 15),
+        ("3:15 pm", 15.25 - 24),
+        ("3pm", 15 - 24),
         ("12 am", 0),
-        ("12:30 p.m.", 12.5),
+        ("12:30 p.m.", 12.5 - 24),
         ("noon", 12),
         ("last 10 minutes", 12 - 1 / 6),
         ("the last hour", 11),
@@ -122,3 +122,41 @@ def test_from_a_moment_to_a_period_is_to_its_end() -> None:
 )
 def test_a_time_of_an_event_is_still_to_come(written: str, hour: float) -> None:
     assert read_moment(written, NOW) == MONDAY + timedelta(hours=hour)
+
+
+@pytest.mark.parametrize(
+    ("since", "until", "begin_h", "end_h"),
+    [
+        ("23:30", None, -0.5, None),
+        ("23:30", "23:45", -0.5, -0.25),
+        ("22:00", "in 1h", -2, 1 + 1 / 6),
+        ("0:05", "14:00", 1 / 12, 14),
+        (None, "14:00", None, 14),
+    ],
+)
+def test_a_time_of_the_past_that_is_still_to_come_today_is_yesterdays(
+    since: str | None, until: str | None, begin_h: float | None, end_h: float | None
+) -> None:
+    now = MONDAY + timedelta(minutes=10)
+    begin, end = (None if h is None else MONDAY + timedelta(hours=h) for h in (begin_h, end_h))
+    assert read_past(since, until, now) == (begin, end)
+
+
+def test_this_monday_is_of_the_past_where_the_past_is_asked_for() -> None:
+    begin, end = read_past("this Monday", None, NOW + timedelta(days=2))
+    assert (begin, end) == (MONDAY, MONDAY + timedelta(days=1))
+
+
+@pytest.mark.parametrize(
+    ("written", "hour"),
+    [("in the morning", 29), ("this morning", 5), ("Monday 9:30", 7 * 24 + 9.5), ("today 9:30", 9.5)],
+)
+def test_what_is_over_today_and_said_of_what_is_to_come_is_the_next_one(
+    written: str, hour: float
+) -> None:
+    assert read_moment(written, NOW) == MONDAY + timedelta(hours=hour)
+
+
+def test_a_weekdays_time_that_is_still_to_come_was_a_week_ago() -> None:
+    begin = MONDAY + timedelta(hours=15 - 7 * 24)
+    assert read_past("Monday 15:00", None, NOW) == (begin, None)

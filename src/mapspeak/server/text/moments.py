@@ -26,14 +26,22 @@ _DAY = re.compile(
     rf"(?:on\s+)?(?:(?P<which>last|next|this)\s+)?(?P<day>{'|'.join((*_DAYS, *_WEEKDAYS))})"
     r"(?:\s+(?P<rest>.+))?"
 )
-_PART_ALONE = re.compile(r"(?:this|in the)\s+(?P<part>morning|noon|afternoon|evening|night)")
+_PART_ALONE = re.compile(
+    r"(?P<which>this|in the)\s+(?P<part>morning|noon|afternoon|evening|night)"
+)
 _NIGHTS = {"tonight": "today night", "last night": "yesterday night"}
 _PARTS = MappingProxyType(
-    {"morning": (5, 12), "noon": (12, 13), "afternoon": (12, 18), "evening": (18, 23)}
+    {
+        "morning": (5, 12),
+        "noon": (12, 13),
+        "afternoon": (12, 18),
+        "evening": (18, 23),
+        "night": (22, 30),
+    }
 )
 """Hours from and to which a part of a day lasts."""
-_NIGHT_HOURS = (22, 6)
 _HALF_DAY_H = 12
+_DAY_LONG, _WEEK_LONG = timedelta(days=1), timedelta(days=7)
 
 Period = tuple[datetime, datetime | None]
 """The first moment, and the first one after; None for a single moment."""
@@ -61,15 +69,27 @@ def read_past(
 ) -> tuple[datetime | None, datetime | None]:
     """Return from when to when, as two texts say it.
 
-    "Yesterday" or "this morning" alone is the whole of it; as `until` it is its end.
+    "Yesterday" or "this morning" alone is the whole of it; as `until` it is its end. A time of day
+    that is still to come is yesterday's.
 
     Raises:
         SemanticMapError: As `read_moment`.
     """
     begin, end = _read_period(since, now), _read_period(until, now)
-    if end is not None:
-        return (begin and begin[0]), end[1] or end[0]
-    return (begin and begin[0]), (begin and begin[1])
+    first, last = (begin and begin[0]), end and (end[1] or end[0])
+    if first is None or now is None:
+        return first, last
+    if first > now and _is_clock(since):
+        first -= _DAY_LONG
+    if last is None:
+        return first, (begin and begin[1])
+    if last > now and _is_clock(until) and last - _DAY_LONG > first:
+        last -= _DAY_LONG
+    return first, last
+
+
+def _is_clock(text: str | None) -> bool:
+    return text is not None and _CLOCK.fullmatch(text.strip()) is not None
 
 
 def read_coming(
@@ -81,8 +101,7 @@ def read_coming(
         SemanticMapError: As `read_moment`.
     """
     start = read_moment(begins, now)
-    is_clock = ends is not None and _CLOCK.fullmatch(ends.strip()) is not None
-    after = start if start is not None and is_clock else now
+    after = start if start is not None and _is_clock(ends) else now
     return start, read_moment(ends, after)
 
 
@@ -109,7 +128,7 @@ def _read_period(
         ) from error
     begin = moment if moment.tzinfo else moment.replace(tzinfo=now.tzinfo)
     is_day = len(words) <= len("2026-11-20")
-    return begin, begin + timedelta(days=1) if is_day else None
+    return begin, begin + _DAY_LONG if is_day else None
 
 
 def _read_span(words: str, now: datetime, is_ahead: bool) -> Period | None:  # noqa: FBT001 - read alike
@@ -129,21 +148,30 @@ def _read_span(words: str, now: datetime, is_ahead: bool) -> Period | None:  # n
 
 def _read_day(words: str, now: datetime, is_ahead: bool) -> Period | None:  # noqa: FBT001 - read alike
     """Read "yesterday", "this morning", "last night", "Monday 9:30", "tomorrow evening"."""
-    words = _NIGHTS.get(words, _PART_ALONE.sub(r"today \g<part>", words))
-    said = _DAY.fullmatch(words)
+    part = _PART_ALONE.fullmatch(words)
+    said = _DAY.fullmatch(f"today {part['part']}" if part else _NIGHTS.get(words, words))
     if said is None:
         return None
     midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
     away = _days_away(said["day"], said["which"], midnight.weekday(), is_ahead=is_ahead)
     day, rest = midnight + timedelta(days=away), said["rest"]
     if rest is None:
-        return day, day + timedelta(days=1)
-    if rest == "night":
-        return _hours(day, _NIGHT_HOURS[0], 24 + _NIGHT_HOURS[1])
+        return day, day + _DAY_LONG
     if rest in _PARTS:
-        return _hours(day, *_PARTS[rest])
+        begin, end = (day + timedelta(hours=hour) for hour in _PARTS[rest])
+        # At noon "in the morning" is tomorrow's, where "this morning" is not.
+        is_next = is_ahead and end <= now and part is not None and part["which"] == "in the"
+        return (begin + _DAY_LONG, end + _DAY_LONG) if is_next else (begin, end)
     clock = _find_clock(rest)
-    return None if clock is None else (datetime.combine(day, clock, now.tzinfo), None)
+    if clock is None:
+        return None
+    moment = datetime.combine(day, clock, now.tzinfo)
+    if said["day"] in _WEEKDAYS and not said["which"]:
+        if is_ahead and moment <= now:
+            moment += _WEEK_LONG
+        elif not is_ahead and moment > now:
+            moment -= _WEEK_LONG
+    return moment, None
 
 
 def _days_away(day: str, which: str | None, weekday: int, *, is_ahead: bool) -> int:
@@ -155,11 +183,7 @@ def _days_away(day: str, which: str | None, weekday: int, *, is_ahead: bool) -> 
         return away or 7
     if which == "last":
         return away - 7
-    return away if is_ahead or which == "this" or not away else away - 7
-
-
-def _hours(day: datetime, begin_h: int, end_h: int) -> Period:
-    return day + timedelta(hours=begin_h), day + timedelta(hours=end_h)
+    return away if is_ahead or not away else away - 7
 
 
 def _read_clock(words: str, now: datetime, is_ahead: bool) -> Period | None:  # noqa: FBT001 - read alike
@@ -168,7 +192,7 @@ def _read_clock(words: str, now: datetime, is_ahead: bool) -> Period | None:  # 
     if clock is None:
         return None
     moment = datetime.combine(now, clock, now.tzinfo)
-    return (moment + timedelta(days=1) if is_ahead and moment <= now else moment), None
+    return (moment + _DAY_LONG if is_ahead and moment <= now else moment), None
 
 
 def _find_clock(words: str) -> time | None:
