@@ -26,3 +26,11 @@ async def test_every_call_is_noted_with_its_answer_and_pictures(tmp_path: Path) 
     assert "R99" in unknown["text"]
     assert "no argument zoom" in wrong["text"]
     assert [each["number"] for each in (look, pose, unknown, wrong)] == [1, 2, 3, 4]
+
+
+async def test_a_call_with_half_a_sign_is_refused_and_noted(tmp_path: Path) -> None:
+    log = CallLog(tmp_path / "calls.jsonl")
+    with log.noting("describe_place", {"place": "\ud800"}) as note:
+        note.error = "described \ud800"
+    (line,) = log.path.read_text().splitlines()
+    assert json.loads(line)["arguments"] == {"place": "\ud800"}

@@ -348,3 +348,33 @@ async def test_the_room_is_that_of_the_new_world_after_a_simulation_was_begun_an
         after = report_of(await client.call_tool("get_robot_pose", {}))
     assert before["place"] == "R2"
     assert after["place"] == "no room"
+
+
+@pytest.mark.parametrize("ending", ["cancel_goal", "navigate_to"])
+async def test_a_drive_that_has_ended_says_nothing_of_the_robot_that_a_later_drive_makes_false(
+    tmp_path: Path, ending: str
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        far = {"x": 6.0, "y": 1.4, "wait_s": 0}
+        await client.call_tool("navigate_to", far)
+        if ending == "cancel_goal":
+            await client.call_tool("cancel_goal", {})
+        await client.call_tool("navigate_to", far | {"y": 1.5})
+        cancelled = report_of(
+            await client.call_tool("wait_for_goal", {"goal_id": "G1", "wait_s": 0})
+        )
+        await client.call_tool("stop_robot", {})
+        replaced = report_of(
+            await client.call_tool("wait_for_goal", {"goal_id": "G1", "wait_s": 0})
+        )
+    assert "stands still" not in cancelled["next_step"]
+    assert "under way" not in replaced["next_step"]
+
+
+async def test_a_stop_with_words_beside_it_is_a_stop(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        answer = await client.call_tool("stop_robot", {"reason": "a person stands in the way"})
+    assert not answer.is_error
+    assert robot.n_stops == 1

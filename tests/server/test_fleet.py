@@ -106,3 +106,10 @@ async def test_a_robot_out_of_reach_keeps_no_other_driving_when_their_client_is_
             await session.drives.start(goal.pose, place=goal.name, ticket=ticket)
     await FleetServer(servers).note_hang_up("mine")
     assert robots["beta"].n_stops == 1
+
+
+async def test_a_stop_that_no_robot_took_is_an_error(tmp_path: Path) -> None:
+    async with fleet(tmp_path) as (client, alpha, beta):
+        answer = await client.call_tool("stop_robot", {"words": "x" * 2_000_000})
+    assert (alpha.n_stops, beta.n_stops) == (0, 0)
+    assert answer.is_error

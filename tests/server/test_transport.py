@@ -112,8 +112,11 @@ async def test_what_a_hang_up_asks_for_is_done_though_the_request_ends_meanwhile
         done.append(client)
 
     async def answer(_scope: Scope, receive: Receive, _send: Send) -> None:
+        async def listen() -> None:
+            await receive()
+
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(receive)
+            tasks.start_soon(listen)
             await anyio.lowlevel.checkpoint()
             tasks.cancel_scope.cancel()
 

@@ -234,7 +234,9 @@ class MapspeakServer(MCPServer[Any]):
         tool = self._offered.get(name)
         if tool is None:
             return
-        if strangers := sorted(set(given) - tool.arguments):
+        strangers = sorted(set(given) - tool.arguments)
+        # A stop is one, whatever is said beside it.
+        if strangers and name != STOP:
             known = ", ".join(sorted(tool.arguments)) or "none"
             raise ToolError(f"{name} has no argument {', '.join(strangers)}; it has: {known}.")
         flags = {key for key, value in given.items() if isinstance(value, bool)}

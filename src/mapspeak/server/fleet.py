@@ -105,19 +105,20 @@ class FleetServer(MCPServer[Any]):
         It takes no robot's name, so that no choice is needed in a hurry.
         """
         said: dict[str, str] = {}
+        faults: dict[str, str] = {}
 
         async def stop(name: str, server: MapspeakServer) -> None:
             try:
-                answer = await server.call_tool(STOP, arguments, context)
-                said[name] = _text_of(answer)
+                said[name] = _text_of(await server.call_tool(STOP, arguments, context))
             except ToolError as error:
-                said[name] = str(error)
+                faults[name] = str(error)
 
         async with anyio.create_task_group() as tasks:
             for name, server in self._servers.items():
                 tasks.start_soon(stop, name, server)
-        text = "\n".join(f"{name}: {said[name]}" for name in self._servers)
-        if any("NOT STOPPED" in line for line in said.values()):
+        told = said | faults
+        text = "\n".join(f"{name}: {told[name]}" for name in self._servers)
+        if faults:
             raise ToolError(text)
         return CallToolResult.model_validate({"content": [{"type": "text", "text": text}]})
 

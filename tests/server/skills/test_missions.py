@@ -10,8 +10,10 @@ import anyio
 import pytest
 
 from guarding import audit_of, make_guard, rectangle
-from mapspeak.robot import GoalState
+from mapspeak.errors import ConfigError
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
+from mapspeak.server.text.world.drives import say_cause
 from mapspeak.skill import (
     JsonValue,
     ParameterKind,
@@ -566,3 +568,37 @@ async def test_a_mission_without_anything_or_with_both_is_refused(tmp_path: Path
         result = await caller.client.call_tool("run_mission", {"tree": "- look", "name": "x"})
     assert "either a tree or a name" in neither
     assert "either a tree or a name" in text_of(result)
+
+
+async def test_a_mission_says_in_words_why_its_drive_ended(tmp_path: Path) -> None:
+    async with missions(tmp_path, guard=make_guard(tmp_path)) as caller:
+        caller.robot.may_drive = anyio.Event()
+        await caller.ask("run_mission", tree="- drive: R2\n", wait_s=0)
+        caller.robot.end_goal(GoalState.TIMED_OUT)
+        cause = Cause(code=CauseCode.NOT_MOVED, after_s=60.0)
+        (goal_id,) = caller.robot.goals
+        caller.robot.ended[goal_id] = GoalStatus(state=GoalState.TIMED_OUT, cause=cause)
+        caller.robot.may_drive.set()
+        told = await caller.until("failed")
+    assert say_cause(cause) in told
+
+
+async def test_a_file_of_a_mission_that_is_called_as_a_tool_takes_no_tools_place(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        await caller.ask("save_mission", name="visit", tree="- drive: R2\n")
+        path = next((tmp_path / "semantic_map.memory" / "missions").glob("*.yaml"))
+        path.with_name("halt.yaml").write_text(path.read_text().replace("visit", "stop_robot"))
+        await caller.ask("show_missions")
+        names = [tool.name for tool in (await caller.client.list_tools()).tools]
+        await caller.ask("stop_robot")
+        assert caller.robot.n_stops == 1
+    assert names.count("stop_robot") == 1
+
+
+async def test_a_skill_that_is_called_as_a_tool_is_refused_at_the_start(tmp_path: Path) -> None:
+    written = "skills:\n- name: stop_robot\n  mission:\n  - wait: 1\n"
+    with pytest.raises(ConfigError, match="stop_robot"):
+        async with missions(tmp_path, skills_file=written):
+            pass

@@ -149,7 +149,12 @@ def test_this_monday_is_of_the_past_where_the_past_is_asked_for() -> None:
 
 @pytest.mark.parametrize(
     ("written", "hour"),
-    [("in the morning", 29), ("this morning", 5), ("Monday 9:30", 7 * 24 + 9.5), ("today 9:30", 9.5)],
+    [
+        ("in the morning", 29),
+        ("this morning", 5),
+        ("Monday 9:30", 7 * 24 + 9.5),
+        ("today 9:30", 9.5),
+    ],
 )
 def test_what_is_over_today_and_said_of_what_is_to_come_is_the_next_one(
     written: str, hour: float

@@ -562,3 +562,54 @@ async def test_a_closed_door_and_what_lies_behind_name_the_event(tmp_path: Path,
     assert "Nothing is odd." in memory
     assert inside.is_error
     assert "Drive out first" in text_of(inside)
+
+
+async def test_a_page_behind_the_last_observation_is_not_told_as_nothing_observed(
+    tmp_path: Path,
+) -> None:
+    guard = make_guard(tmp_path, clock=WallClock())
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        await client.call_tool("look_through_camera", {})
+        told = text_of(await client.call_tool("recall_episodes", {"from_row": 20}))
+    assert told.startswith("1 observation;")
+    assert "Nothing observed passes" not in told
+    assert "from_row" in told
+
+
+async def test_what_the_detector_has_seen_in_a_room_goes_by_the_map_as_it_is_now(
+    tmp_path: Path,
+) -> None:
+    cells = two_rooms().cells.copy()
+    cells[1:-1, 13] = 0
+    robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.25), pose=Pose(5.0, 1.0))
+    robot.detections = (LADDER,)
+    guard = make_guard(tmp_path, clock=WallClock())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        await client.call_tool("look_through_camera", {})
+        robot.grid = two_rooms()
+        east, west = [
+            report_of(await client.call_tool("find_place", {"query": "ladder", "room": room}))
+            for room in ("6, 1", "1.5, 1")
+        ]
+    assert "but seen" in east["advice"]
+    assert "but seen" not in west["advice"]
+
+
+async def test_a_memory_that_cannot_be_read_is_warned_of_where_closures_are_asked_for(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "semantic_map.yaml").write_text(
+        "version: 1\nwaypoints:\n  - name: a\n    pose: 3\n"
+    )
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        told = text_of(await client.call_tool("what_is_blocked", {}))
+    assert "line 4" in told
+
+
+async def test_a_place_that_is_not_remembered_is_answered_with_how_many_are(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        await remember(client, *({"name": f"spot {n}", "description": "a"} for n in range(14)))
+        refused = text_of(await client.call_tool("get_semantic_data", {"name": "attic"}))
+    assert "and 2 more" in refused

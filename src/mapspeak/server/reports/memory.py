@@ -26,6 +26,7 @@ from mapspeak.server.text.memory import say_age
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_advice, say_evidence
 from mapspeak.server.text.wording import build_table, say_count, say_pose
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_READ = 200
 APART_M = 1.0
@@ -33,6 +34,7 @@ APART_M = 1.0
 
 
 def say_reported(
+    world: WorldModel,
     find: Callable[[EpisodeQuery], EpisodePage],
     answer: Recall,
     query: RecallQuery,
@@ -44,6 +46,7 @@ def say_reported(
     A report is less than a record: nobody has checked it, and where the thing is was not noted.
 
     Args:
+        world: The map as it is now, with its rooms.
         find: Finds observations, placed on the robot's map.
         answer: What is remembered.
         query: What was asked.
@@ -56,6 +59,7 @@ def say_reported(
     seen = [
         (label, each)
         for each in _find_pictures(find, query)
+        if query.room_id in (None, world.find_room_id(each.pose.point))
         if (label := _find_label(each, query.words)) is not None
     ]
     if not seen:
@@ -78,7 +82,6 @@ def _find_pictures(
         words=query.words,
         near=query.near,
         radius_m=None if query.near is None else query.near_m,
-        room_id=query.room_id,
         since=query.since,
         until=query.until,
         kind=ObservationKind.PICTURE,

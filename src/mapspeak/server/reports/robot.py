@@ -19,7 +19,7 @@ from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_places_left
-from mapspeak.server.text.wording import say_elsewhere, say_pose, say_pose_doubt
+from mapspeak.server.text.wording import list_some, say_elsewhere, say_pose, say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
 from mapspeak.worldmodel.remembered import RememberedPlace, number_places
 
@@ -59,8 +59,8 @@ NEXT_STEP = {
     GoalState.ACCEPTED: "Call {wait_for_goal}. {stop_robot} or {cancel_goal} end it.",
     GoalState.DRIVING: "Call {wait_for_goal}. {stop_robot} or {cancel_goal} end it.",
     GoalState.BLOCKED: "Call {look_at_map}. Choose another place or another way.",
-    GoalState.CANCELLED: "The robot stands still; send a new goal when ready.",
-    GoalState.PREEMPTED: "A newer goal is under way; ask for that one.",
+    GoalState.CANCELLED: "Send a new goal when ready.",
+    GoalState.PREEMPTED: "Ask for the newer goal.",
     GoalState.REJECTED: "Call {look_at_map}. Choose a place inside known free space.",
     GoalState.TIMED_OUT: "The robot was told to stop. Check its navigation, then send a new goal.",
     GoalState.LOST: "The robot was told to stop. Check where it is, then send a new goal.",
@@ -267,9 +267,8 @@ class MemoryAnswer(Report):
                 hint=lead("{realign_memory} finds out how the maps lie."),
             )
         if name is not None and not shown:
-            known = ", ".join(
-                f"{place.id} {quote_name(place.waypoint.name)}" for place in places[:MOST_NAMED]
-            )
+            named = [f"{place.id} {quote_name(place.waypoint.name)}" for place in places]
+            known = list_some(named, most=MOST_NAMED)
             raise SemanticMapError(
                 f"No place called {name[:80]!r} is remembered.",
                 hint=f"Remembered are {known or 'no places yet'}; without a name all are given.",

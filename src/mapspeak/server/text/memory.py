@@ -141,16 +141,17 @@ def describe_episodes(
     Args:
         summed: What to sum up before, also of other pages; nothing without any.
     """
-    first = 0 if page.next_page is None else page.next_page.offset - len(page.matches)
     lines = [f"{say_count(page.n_matches, 'observation')}; showing {len(page.matches)}. {OBSERVED}"]
     lines += _sum_up(summed, page.n_matches, now)
     if page.anchor is not None:
         lines.append(f"Near to where this was: {say_episode(page.anchor, now=now)}")
     lines += [say_episode(match, now=now) for match in page.matches]
     if page.next_page is not None:
-        lines.append(f"More with from_row={first + len(page.matches)}.")
-    if not page.matches:
+        lines.append(f"More with from_row={page.next_page.offset}.")
+    if not page.n_matches:
         lines.append("Nothing observed passes all of these; leave something out.")
+    elif not page.matches:
+        lines.append(f"The last is that of from_row={page.n_matches - 1}.")
     return "\n".join(lines)
 
 

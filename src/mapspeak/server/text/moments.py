@@ -26,9 +26,7 @@ _DAY = re.compile(
     rf"(?:on\s+)?(?:(?P<which>last|next|this)\s+)?(?P<day>{'|'.join((*_DAYS, *_WEEKDAYS))})"
     r"(?:\s+(?P<rest>.+))?"
 )
-_PART_ALONE = re.compile(
-    r"(?P<which>this|in the)\s+(?P<part>morning|noon|afternoon|evening|night)"
-)
+_PART_ALONE = re.compile(r"(?P<which>this|in the)\s+(?P<part>morning|noon|afternoon|evening|night)")
 _NIGHTS = {"tonight": "today night", "last night": "yesterday night"}
 _PARTS = MappingProxyType(
     {

@@ -161,7 +161,7 @@ class FindTools:
             )
             if now is None:
                 return report
-            seen = say_reported(session.find_reported, answer, wanted, now=now)
+            seen = say_reported(world, session.find_reported, answer, wanted, now=now)
             advice = f"{report.advice} {seen}".rstrip()
             return report.model_copy(update={"advice": advice})
 

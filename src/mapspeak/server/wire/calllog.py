@@ -88,7 +88,8 @@ class CallLog:
                 **self._read(note, number),
                 "wall_s": round(time.monotonic() - begun_s, 3),
             }
-            with self.path.open("a", encoding="utf-8") as file:
+            # Half a sign of UTF-16 is written as in JSON.
+            with self.path.open("a", encoding="utf-8", errors="backslashreplace") as file:
                 file.write(json.dumps(line, ensure_ascii=False, default=str) + "\n")
 
     def _read(self, note: CallNote, number: int) -> dict[str, Any]:

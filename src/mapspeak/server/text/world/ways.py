@@ -23,6 +23,7 @@ from mapspeak.server.text.wording import (
     say_obstruction,
     say_path,
     say_point,
+    say_warnings,
     shorten,
 )
 from mapspeak.server.text.world.drives import say_end
@@ -72,9 +73,20 @@ def describe_blocked(
     counted = ", ".join(
         f"{what} ({n_borders if what == BORDERS else len(lines)})" for what, lines in known.items()
     )
-    lines = [f"The robot is held, so it drives nowhere: {shorten(held_by)}."] if held_by else []
+    lines = list(_say_doubts(world, events, now))
+    lines += [f"The robot is held, so it drives nowhere: {shorten(held_by)}."] if held_by else []
     lines += [f"In the way: {counted}." if known else NOTHING]
     return "\n\n".join(["\n".join(lines), *(_section(*part) for part in known.items())])
+
+
+def _say_doubts(world: WorldModel, events: Sequence[Event], now: datetime | None) -> Iterator[str]:
+    """Say why not all that is in the way may be known: the warnings that are of no event."""
+    of_events: set[str] = set()
+    if now is not None:
+        of_events = {*say_events(events, now), *say_unplaced(events, world.map, now)}
+    for warning in say_warnings(world):
+        if warning.removeprefix("Warning: ") not in of_events:
+            yield warning
 
 
 def _section(what: str, lines: Sequence[str]) -> str:

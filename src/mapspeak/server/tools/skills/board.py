@@ -9,7 +9,7 @@ from mcp.server.mcpserver.exceptions import ToolError
 from mcp_types import CallToolResult, TextContent, ToolAnnotations
 from mcp_types import Tool as ListedTool
 
-from mapspeak.errors import MapspeakError
+from mapspeak.errors import MapspeakError, SkillError
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import say_error
 from mapspeak.server.text.skills import describe_skill
@@ -80,8 +80,14 @@ class SkillBoard:
         return {*self._others(), *self._offered}
 
     def put_up(self, skill: Skill) -> None:
-        """Offer a skill under its name, in place of one of that name."""
+        """Offer a skill under its name, in place of one of that name.
+
+        Raises:
+            SkillError: A tool that is no skill is called so.
+        """
         spec = skill.spec
+        if spec.name in self._others():
+            raise SkillError(f"{spec.name!r} is a tool, and no skill's name.", hint="Rename it.")
         reads = spec.effect is SkillEffect.READS
         if self.is_read_only and not reads:
             return

@@ -92,10 +92,28 @@ class SkillBook:
         return found
 
     def put_up(self, board: SkillBoard) -> None:
-        """Offer the robot's own skills, the owner's and the saved missions as tools."""
+        """Offer the robot's own skills, the owner's and the saved missions as tools.
+
+        Raises:
+            ConfigError: An owner's skill is called as a tool.
+        """
         self._board = board
-        for skill in (*self._own.values(), *self._owned.values(), *self.saved.values()):
-            board.put_up(skill)
+        for skill in self._owned.values():
+            try:
+                board.put_up(skill)
+            except SkillError as error:
+                raise ConfigError(f"skills.yaml: {error.message}", hint=error.hint) from error
+        for skill in (*self._own.values(), *self.saved.values()):
+            self._offer(skill)
+
+    def _offer(self, skill: Skill) -> None:
+        """Offer a skill as a tool once there is a board; one that is called as a tool is none."""
+        if self._board is None:
+            return
+        try:
+            self._board.put_up(skill)
+        except SkillError as error:
+            logger.warning("%s", error)
 
     def load_saved(self) -> None:
         """Read the saved missions anew; people may have edited the files."""
@@ -115,8 +133,7 @@ class SkillBook:
         for name, (path, entry) in self._files.items():
             if before.get(name) != (path, entry):
                 self.saved[name] = self.open_mission(entry, path)
-                if self._board is not None:
-                    self._board.put_up(self.saved[name])
+                self._offer(self.saved[name])
 
     def check_free(self, name: str) -> None:
         """Return when a mission may be saved under a name.

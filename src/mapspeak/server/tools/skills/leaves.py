@@ -9,6 +9,7 @@ from mapspeak.memory.episodes.observation import ObservationKind
 from mapspeak.places.relations.viewpoints import choose_view, is_there
 from mapspeak.robot import GoalState
 from mapspeak.safety import current_caller
+from mapspeak.server.text.world.drives import say_cause
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.session import Session
 from mapspeak.skill import (
@@ -184,8 +185,8 @@ class Leaves:
         if status.state is GoalState.ARRIVED:
             return succeeded(place=drive.place)
         state, code = ENDS.get(status.state, (SkillState.FAILED, SkillCode.ABORTED))
-        quote = "" if status.cause is None else str(status.cause)
-        return SkillOutcome(state, code, outputs={"place": drive.place}, quote=quote)
+        outputs, quote = {"place": drive.place}, say_cause(status.cause)
+        return SkillOutcome(state, code, outputs=outputs, quote=quote)
 
     async def _note(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Keep an observation with the time and the pose; `recall_episodes` finds it again."""
