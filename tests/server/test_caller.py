@@ -16,6 +16,7 @@ from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy, Publish
 from mapspeak.server.app import build_server
+from mapspeak.server.text.offered import ANSWER_DOES_NOT_COUNT, DISAGREED
 from mapspeak.session import Session
 from served import connect, text_of
 
@@ -138,3 +139,40 @@ async def test_a_client_that_was_asked_does_not_lend_its_answer_to_one_that_cann
         assert not robot.goals
         await answer(asked, HERE, key, YES, state)
         assert len(robot.goals) == 1
+
+
+async def test_an_answer_that_was_used_or_is_too_old_is_not_told_as_a_refusal(
+    tmp_path: Path,
+) -> None:
+    robot, guard = FakeRobot(HALL, pose=Pose(1.5, 1.0)), asking_guard(tmp_path)
+    async with connect(robot, tmp_path, guard=guard, on_question=agree) as client:
+        key, state = await ask(client, HERE)
+        await answer(client, HERE, key, YES, state)
+        again = await answer(client, HERE, key, YES, state)
+        no = await answer(client, HERE, key, ElicitResult(action="decline"), state)
+    assert isinstance(again, CallToolResult)
+    assert isinstance(no, CallToolResult)
+    assert text_of(no) == DISAGREED
+    assert again.is_error
+    assert text_of(again) != DISAGREED
+
+
+async def test_a_person_who_answers_after_the_request_was_forgotten_is_told_to_be_late(
+    tmp_path: Path,
+) -> None:
+    robot, guard = FakeRobot(HALL, pose=Pose(1.5, 1.0)), asking_guard(tmp_path)
+
+    async def agree_late(
+        context: ClientRequestContext, params: ElicitRequestParams
+    ) -> ElicitResult:
+        now_s = guard.approvals.now_s()
+        guard.approvals.now_s = lambda: now_s + 3600.0
+        known_ids(guard)
+        return await agree(context, params)
+
+    legacy = connect(robot, tmp_path, mode="legacy", guard=guard, on_question=agree_late)
+    async with legacy as client:
+        late = await client.call_tool("navigate_to", dict(HERE))
+    assert late.is_error
+    assert text_of(late) == ANSWER_DOES_NOT_COUNT
+    assert not robot.goals

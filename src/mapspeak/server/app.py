@@ -27,7 +27,7 @@ from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.remarks import Remarks, shorten_report, show_controls_of
 from mapspeak.server.reports.representations import Representation
-from mapspeak.server.text.offered import DISAGREED, explain, offering, write_instructions
+from mapspeak.server.text.offered import explain, offering, write_instructions
 from mapspeak.server.text.wording import show_controls
 from mapspeak.server.tools.caller import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess
@@ -170,8 +170,8 @@ class MapspeakServer(MCPServer[Any]):
         if guard is None:
             return await self._run(name, arguments, context)
         asking = Asking(context, approval=guard.policy.approval, client=name_client(context))
-        if not asking.take_answers(guard.approvals):
-            raise ToolError(DISAGREED)
+        if refused := asking.take_answers(guard.approvals):
+            raise ToolError(refused)
         try:
             return await self._run(name, arguments, context)
         except ToolError as error:
@@ -181,8 +181,8 @@ class MapspeakServer(MCPServer[Any]):
             question = asking.ask_by_answer(needed, guard.approvals)
             if question is not None:
                 return question
-            if not await asking.ask_at_once(needed, guard.approvals):
-                raise ToolError(DISAGREED) from error
+            if refused := await asking.ask_at_once(needed, guard.approvals):
+                raise ToolError(refused) from error
         return await self._run(name, arguments, context)
 
     async def _run(

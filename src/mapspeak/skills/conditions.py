@@ -35,7 +35,7 @@ MODIFIERS = frozenset({"not", "within_m", "within_s"})
 
 
 class Facts(Protocol):
-    """The present facts, as far as the robot and its memory know."""
+    """The present facts, as far as the robot and its memory know; None is what is not known."""
 
     @property
     def now_s(self) -> float:
@@ -53,23 +53,23 @@ class Facts(Protocol):
     async def is_standing(self) -> bool:
         """Return True while no drive is under way."""
 
-    async def is_in(self, room: str) -> bool:
+    async def is_in(self, room: str) -> bool | None:
         """Return True where the robot is in a room, by its id or its name."""
 
-    async def is_near(self, place: str, within_m: float) -> bool:
+    async def is_near(self, place: str, within_m: float) -> bool | None:
         """Return True where the robot is so near to a place, in a straight line."""
 
-    async def has_event(self, words: str) -> bool:
+    async def has_event(self, words: str) -> bool | None:
         """Return True while an event lasts in whose words these stand."""
 
-    async def sees(self, label: str) -> bool:
+    async def sees(self, label: str) -> bool | None:
         """Return True where the robot's detector reports such a thing now."""
 
 
 async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
     """Return the first condition that does not hold, by its name; empty where all hold.
 
-    What is not known does not hold.
+    What is not known does not hold, and neither does its opposite.
 
     Raises:
         SkillError: Nothing is wanted, or a time of day cannot be read.
@@ -80,23 +80,24 @@ async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
             "A condition needs something that is to hold.",
             hint=f"Give one of: {', '.join(each.name for each in CONDITIONS)}.",
         )
-    unmet: dict[str, JsonValue] = {}
+    is_opposite = wanted.get("not", False)
     for name in named:
-        if not await _holds(name, wanted, facts):
-            unmet = {name: wanted[name]}
-            break
-    if not wanted.get("not", False):
-        return unmet
-    return {} if unmet else {"not": {name: wanted[name] for name in named}}
+        holds = await _holds(name, wanted, facts)
+        if is_opposite and holds is False:
+            return {}
+        if not is_opposite and not holds:
+            return {name: wanted[name]}
+    return {"not": {name: wanted[name] for name in named}} if is_opposite else {}
 
 
-async def _holds(name: str, wanted: Arguments, facts: Facts) -> bool:
+async def _holds(name: str, wanted: Arguments, facts: Facts) -> bool | None:
     value = wanted[name]
+    holds: bool | None
     match name:
         case "battery_above" | "battery_below":
             battery = await facts.fetch_battery()
             key = name.removeprefix("battery_")
-            holds = battery is not None and is_as_wanted(battery, {key: value})
+            holds = None if battery is None else is_as_wanted(battery, {key: value})
         case "standing":
             holds = await facts.is_standing() is value
         case "in_room":
@@ -130,9 +131,9 @@ def is_as_wanted(value: JsonValue, wanted: Mapping[str, JsonValue]) -> bool:
     return (above is None or number > above) and (below is None or number < below)
 
 
-def _is_time(wanted: Arguments, now: datetime | None) -> bool:
+def _is_time(wanted: Arguments, now: datetime | None) -> bool | None:
     if now is None:
-        return False
+        return None
     begins = _minutes(wanted.get("time_from", "00:00"))
     ends = _minutes(wanted.get("time_until", "24:00"))
     minute = now.hour * 60 + now.minute

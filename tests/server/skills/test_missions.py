@@ -602,3 +602,19 @@ async def test_a_skill_that_is_called_as_a_tool_is_refused_at_the_start(tmp_path
     with pytest.raises(ConfigError, match="stop_robot"):
         async with missions(tmp_path, skills_file=written):
             pass
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    ["sees: person", "near: the attic", "in_room: attic", "battery_below: 0.2", "event: closed"],
+)
+async def test_of_what_is_not_known_the_opposite_does_not_hold_either(
+    tmp_path: Path, wanted: str
+) -> None:
+    async with missions(tmp_path) as caller:
+        caller.robot.battery = None
+        said = [
+            await caller.ask("run_mission", tree=f"- check: {{{wanted}, not: {flag}}}\n")
+            for flag in ("true", "false")
+        ]
+    assert all("check: failed" in each for each in said)

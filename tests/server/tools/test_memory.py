@@ -613,3 +613,17 @@ async def test_a_place_that_is_not_remembered_is_answered_with_how_many_are(
         await remember(client, *({"name": f"spot {n}", "description": "a"} for n in range(14)))
         refused = text_of(await client.call_tool("get_semantic_data", {"name": "attic"}))
     assert "and 2 more" in refused
+
+
+async def test_a_thing_out_of_the_radius_is_not_told_as_one_whose_position_is_not_known(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        await remember(
+            client,
+            record("a", 1.5, 1.0, "sink", bearing_deg=0, range_m=1.0),
+            record("b", 5.0, 1.0, "ladder", bearing_deg=0, range_m=1.0),
+        )
+        near = {"near_seen": "ladder", "radius_m": 0.5}
+        told = text_of(await client.call_tool("recall_episodes", near))
+    assert "whose position is known" not in told

@@ -1,7 +1,7 @@
 """A world model as a picture: rooms, doors, frontiers, places and the robot, under their ids."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,8 +121,7 @@ def draw_world(view: MapView) -> WorldPicture:
             ),
             marks=(
                 *(_door_mark(door, is_way=bool(world.find_crossing(door))) for door in doors),
-                *(_frontiers(view) if Layer.FRONTIERS in look.layers else ()),
-                *(_places(view) if Layer.PLACES in look.layers else ()),
+                *_frontiers_and_places(view),
             ),
             robot=world.robot,
             legend=LEGEND,
@@ -199,28 +198,14 @@ def _door_mark(door: Door, *, is_way: bool = True) -> Mark:
     return Mark(point=door.place, label=door.id, shape=shape, colour=Colour.ORANGE)
 
 
-def _frontiers(view: MapView) -> tuple[Mark, ...]:
-    return tuple(
-        Mark(
-            point=frontier.pose.point,
-            label=frontier.id,
-            shape=Shape.TRIANGLE,
-            colour=Colour.VERMILION,
-        )
-        for frontier in view.frontiers.items
-    )
-
-
-def _places(view: MapView) -> tuple[Mark, ...]:
-    return tuple(
-        Mark(
-            point=place.waypoint.pose.point,
-            label=place.id,
-            shape=Shape.DIAMOND,
-            colour=Colour.BLUE,
-        )
-        for place in view.places.items
-    )
+def _frontiers_and_places(view: MapView) -> Iterator[Mark]:
+    if Layer.FRONTIERS in view.look.layers:
+        shape, colour = Shape.TRIANGLE, Colour.VERMILION
+        for each in view.frontiers.items:
+            yield Mark(point=each.pose.point, label=each.id, shape=shape, colour=colour)
+    if Layer.PLACES in view.look.layers:
+        for place in view.places.items:
+            yield Mark(point=place.waypoint.pose.point, label=place.id, shape=Shape.DIAMOND)
 
 
 def _closed_areas(view: MapView) -> tuple[Zone, ...]:

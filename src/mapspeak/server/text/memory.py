@@ -237,7 +237,7 @@ def describe_nearby(world: WorldModel, nearby: Nearby) -> str:
         )
     nearest = nearby.nearest[:MOST_THINGS]
     told = [f"{_say_thing(world, each)}, {away_m:.1f} m" for each, away_m in nearest]
-    lines.append(f"Things nearest to it: {'; '.join(told) or 'none whose position is known'}.")
+    lines.append(f"Things nearest to it: {'; '.join(told) or 'none known there'}.")
     lines.append("Observations without it, by how near to it they were made:")
     return "\n".join(lines)
 
@@ -305,7 +305,7 @@ def say_replaced(previous: Waypoint | None, now: Waypoint) -> Iterator[str]:
         yield f"layout {quote(shorten('; '.join(previous.geometric_features)))}"
 
 
-def say_far(previous: Waypoint | None, now: Waypoint, *, rooms: Sequence[str | None]) -> list[str]:
+def say_far(previous: Waypoint, now: Waypoint, *, rooms: Sequence[str | None]) -> list[str]:
     """Warn where a name was noted so far from before that another place may be meant.
 
     Args:
@@ -313,8 +313,6 @@ def say_far(previous: Waypoint | None, now: Waypoint, *, rooms: Sequence[str | N
         now: As it is from now on.
         rooms: The rooms that the earlier and the later pose lie in, by id.
     """
-    if previous is None:
-        return []
     before, after = (room or "no room" for room in rooms)
     away_m = previous.pose.point.distance_to(now.pose.point)
     if before == after and away_m <= FAR_M:

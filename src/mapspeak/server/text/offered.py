@@ -17,6 +17,14 @@ _OFFERED: ContextVar[frozenset[str] | None] = ContextVar("offered", default=None
 DISAGREED = (
     "The person who was asked did not agree. Do not ask again; tell them what you need it for."
 )
+NOT_ANSWERED = (
+    "The client brought no answer of its person, so nothing was done. Tell them what you need it "
+    "for."
+)
+ANSWER_DOES_NOT_COUNT = (
+    "That answer does not count: it was used before, or came too late. Call again to have the "
+    "person asked."
+)
 ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
 """A name of an argument, or the number of an item; pydantic names the tried types among them."""
 INSTANCE = re.compile(r"a valid dictionary or instance of \w+")

@@ -12,6 +12,7 @@ from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
 from mapspeak.server.text.offered import lead
+from mapspeak.server.text.wording import list_some, say_count
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace
 
@@ -184,21 +185,17 @@ def say_places_left(left: Sequence[RememberedPlace], *, first: int) -> Iterator[
     """
     if not left:
         return
-    named = ", ".join(
-        f"{each.id} {quote_name(each.waypoint.name)}" for each in left[:MOST_LEFT_NAMED]
-    )
-    n_more = len(left) - MOST_LEFT_NAMED
-    others = f" and {n_more} more" if n_more > 0 else ""
-    yield f"{len(left)} left out, from_row={first} goes on: {named}{others}."
+    named = [f"{each.id} {quote_name(each.waypoint.name)}" for each in left]
+    told = list_some(named, most=MOST_LEFT_NAMED)
+    yield f"{len(left)} left out, from_row={first} goes on: {told}."
 
 
 def say_forgotten(done: Forgotten, words: str, *, is_undo: bool = False) -> str:
     """Say what is forgotten, or remembered again, and how to take it back."""
     parts = [f"the place {quote_name(each)}" for each in done.places]
     if done.n_landmarks:
-        views = "1 view" if done.n_landmarks == 1 else f"{done.n_landmarks} views"
-        named = ", ".join(map(quote_name, done.seen_from[:MOST_LEFT_NAMED]))
-        parts.append(f"{views} of it, noted at {named}")
+        named = list_some([*map(quote_name, done.seen_from)], most=MOST_LEFT_NAMED)
+        parts.append(f"{say_count(done.n_landmarks, 'view')} of it, noted at {named}")
     if not parts:
         return f"Nothing that was forgotten is called {quote_name(words)}; nothing changed."
     told = "; ".join(parts)

@@ -26,6 +26,7 @@ from mapspeak.memory import (
     tells_what_to_do,
 )
 from mapspeak.memory.things.labels import name_the_same
+from mapspeak.places.naming import is_taken_name
 from mapspeak.server.text.offered import lead
 
 SAME_VIEW_RAD = math.radians(15.0)
@@ -135,19 +136,6 @@ class Annotator:
         """Return the layout features that may be remembered."""
         return tuple(feature for feature in given if not self._is_against_policy(feature))
 
-    def take_name(self, name: str) -> str:
-        """Return a place's name.
-
-        Raises:
-            SemanticMapError: It gives orders.
-        """
-        if tells_what_to_do(name):
-            raise SemanticMapError(
-                f"{name[:80]!r} is no name: {LEFT_OUT[Concern.ORDERS]}",
-                hint="Give a name in words, such as 'dock corner'.",
-            )
-        return name
-
     def take_description(self, text: str) -> str:
         """Return the description; none where it gives orders."""
         if not tells_what_to_do(text):
@@ -240,6 +228,20 @@ class Annotator:
         return SemanticMapError(
             f"There is no picture {said!r}; {known}.", hint=lead("Call {look_through_camera}.")
         )
+
+
+def check_name(name: str) -> None:
+    """Check that a place may be called so.
+
+    Raises:
+        SemanticMapError: It gives orders, or reads like something else.
+    """
+    fault = f"is no name: {LEFT_OUT[Concern.ORDERS]}" if tells_what_to_do(name) else ""
+    if is_taken_name(name):
+        fault = "reads like an id, coordinates or the robot itself."
+    if fault:
+        hint = "Give a name in words, such as 'dock corner'."
+        raise SemanticMapError(f"{name[:80]!r} {fault}", hint=hint)
 
 
 def _things(given: Iterable[Landmarks | None]) -> Iterator[LandmarkInput]:

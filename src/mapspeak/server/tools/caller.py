@@ -1,6 +1,6 @@
 """The caller of a tool: which client, how long it waits, progress, approval by its person."""
 
-from typing import Any
+from typing import Annotated, Any
 
 from mcp.server.elicitation import AcceptedElicitation, render_elicitation_schema
 from mcp.server.mcpserver import Context
@@ -19,6 +19,7 @@ from pydantic import BaseModel, BeforeValidator, Field, StrictBool
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.safety import Approval, ApprovalNeededError, Approvals, Otherwise
+from mapspeak.server.text.offered import ANSWER_DOES_NOT_COUNT, DISAGREED, NOT_ANSWERED
 
 LONGEST_WAIT_S = 25.0
 """Clients give up on a call that takes much longer."""
@@ -27,13 +28,19 @@ CALLS_AGAIN = "2026-07-28"
 KEY = "approval-"
 
 
-def _shorten_wait(wait_s: Any) -> Any:  # noqa: ANN401 - what is no number is refused later
+def shorten_wait(wait_s: Any) -> Any:  # noqa: ANN401 - what is no number is refused later
+    """Return a wait that a client has the patience for."""
     is_number = isinstance(wait_s, int | float) and not isinstance(wait_s, bool)
     return min(wait_s, LONGEST_WAIT_S) if is_number else wait_s
 
 
-AT_MOST_LONGEST_WAIT = BeforeValidator(_shorten_wait)
+AT_MOST_LONGEST_WAIT = BeforeValidator(shorten_wait)
 """A longer wait is cut to this; the client can call again."""
+WaitForEnd = Annotated[
+    float,
+    Field(description="seconds to wait for its end", ge=0, le=LONGEST_WAIT_S),
+    AT_MOST_LONGEST_WAIT,
+]
 
 
 def client_of(context: Context) -> str:
@@ -84,20 +91,19 @@ class Asking:
         self._approval = approval
         self._client = client
 
-    def take_answers(self, approvals: Approvals) -> bool:
-        """Grant the approved commands; return False when the person was asked and refused."""
+    def take_answers(self, approvals: Approvals) -> str:
+        """Grant the approved commands; return why an answer grants nothing, else nothing."""
         given = self._context.input_responses if self._context is not None else None
         answers = {key: each for key, each in (given or {}).items() if key.startswith(KEY)}
         for key, answer in answers.items():
             if not isinstance(answer, ElicitResult) or not _is_yes(answer):
-                return False
-            if not self.can_ask:
-                return False
+                return DISAGREED
             state = self._context.request_state if self._context is not None else None
-            request_id = key.removeprefix(KEY)
-            if not approvals.grant(request_id, client=self._client, secret=state or ""):
-                return False
-        return True
+            request_id, secret = key.removeprefix(KEY), state or ""
+            is_asked = self.can_ask
+            if not is_asked or not approvals.grant(request_id, client=self._client, secret=secret):
+                return ANSWER_DOES_NOT_COUNT
+        return ""
 
     @property
     def can_ask(self) -> bool:
@@ -123,19 +129,21 @@ class Asking:
             request_state=approvals.ask_client(needed.request_id),
         )
 
-    async def ask_at_once(self, needed: ApprovalNeededError, approvals: Approvals) -> bool:
-        """Ask within the call, and return whether the person agreed."""
+    async def ask_at_once(self, needed: ApprovalNeededError, approvals: Approvals) -> str:
+        """Ask within the call; return why the command is not granted, else nothing."""
         if self._context is None:
-            return False
+            return NOT_ANSWERED
+        # While the person thinks, the request may be forgotten.
+        secret = approvals.ask_client(needed.request_id)
         try:
             answer = await self._context.elicit(needed.question, Agreement)
         except (MCPError, ValueError):
             # A client that promised to ask, and did not, has no word to give.
-            return False
+            return NOT_ANSWERED
         if not isinstance(answer, AcceptedElicitation) or answer.data.agree is not True:
-            return False
-        secret = approvals.ask_client(needed.request_id)
-        return approvals.grant(needed.request_id, client=self._client, secret=secret)
+            return DISAGREED
+        is_granted = approvals.grant(needed.request_id, client=self._client, secret=secret)
+        return "" if is_granted else ANSWER_DOES_NOT_COUNT
 
 
 def _is_yes(answer: ElicitResult) -> bool:

@@ -25,6 +25,7 @@ from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import find_renamed
 from mapspeak.places.recall import events
 from mapspeak.places.recall.nearby import find_nearby
+from mapspeak.places.relations.choosing import find_place
 from mapspeak.places.things import forget
 from mapspeak.server.text.findings import say_moved, say_receipt
 from mapspeak.server.text.memory import (
@@ -38,7 +39,7 @@ from mapspeak.server.text.moments import AHEAD, PAST, read_coming, read_past
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_forgotten
 from mapspeak.server.text.wording import say_renamed
-from mapspeak.server.tools.places import find_point, find_room
+from mapspeak.server.tools.places import find_room
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.worldmodel.model import WorldModel
@@ -46,7 +47,8 @@ from mapspeak.worldmodel.model import WorldModel
 MOST_EPISODES = 20
 MOST_NEAR_SEEN = 8
 """Fewer observations beside things: what is near is mostly told by these."""
-MOST_COMPARED = 1000
+MOST_SUMMED = 1000
+ALL = 1_000_000
 
 FromRow = Annotated[int, Field(description="go on from this row", ge=0, le=1_000_000, strict=True)]
 Words = Annotated[str | None, Field(description="what they are about", max_length=300)]
@@ -155,7 +157,7 @@ class MemoryTools:
             query = replace(wanted, room_id=room_id)
             if near_seen is not None:
                 return self._recall_near_seen(world, near_seen, radius_m, query, now)
-            point = None if near is None else find_point(world, near)
+            point = None if near is None else find_place(world, near).point
             query = replace(query, near=point, radius_m=radius_m)
             return self._list(query, now, world)
 
@@ -172,7 +174,7 @@ class MemoryTools:
         page = self._find(query, world)
         if query.offset or page.next_page is None:
             return describe_episodes(page, now=now)
-        whole = self._find(replace(query, limit=MOST_COMPARED), world)
+        whole = self._find(replace(query, limit=MOST_SUMMED), world)
         return describe_episodes(page, now=now, summed=whole.matches)
 
     def _find(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
@@ -183,7 +185,7 @@ class MemoryTools:
         if query.room_id is None:
             page = find(query)
             return replace(page, matches=tuple(_in_rooms_of(world, page.matches)))
-        whole = find(replace(query, room_id=None, limit=MOST_COMPARED, offset=0))
+        whole = find(replace(query, room_id=None, limit=ALL, offset=0))
         found = [
             replace(match, filters=(*match.filters, EpisodeFilter.ROOM))
             for match in _in_rooms_of(world, whole.matches)
@@ -243,12 +245,7 @@ class MemoryTools:
                 "The robot alone notes in its own name; nothing was noted.",
                 hint="Say in source who said so, or leave it out.",
             )
-        session = self._session
-        now = session.find_wall_time()
-        if now is None:
-            raise SemanticMapError(
-                "The time by the calendar is not known here.", hint="Nothing was noted."
-            )
+        session, now = self._session, self._read_calendar()
         start, end = read_coming(begins, ends, now)
         world = await session.fetch_world_model()
 
@@ -279,12 +276,7 @@ class MemoryTools:
 
         Use it when what was noted is over. What policies close stays closed.
         """
-        session = self._session
-        now = session.find_wall_time()
-        if now is None:
-            raise SemanticMapError(
-                "The time by the calendar is not known here.", hint="Nothing was changed."
-            )
+        session, now = self._session, self._read_calendar()
         ended = await session.compute(lambda: events.end_event(session.memory, event, now=now))
         said = ended.sentence(now)
         try:
@@ -322,6 +314,14 @@ class MemoryTools:
         await session.meet_map()
         receipt = await session.compute(session.keeper.realign)
         return say_receipt(receipt)
+
+    def _read_calendar(self) -> datetime:
+        now = self._session.find_wall_time()
+        if now is None:
+            raise SemanticMapError(
+                "The time by the calendar is not known here.", hint="Nothing was changed."
+            )
+        return now
 
     def _keep_note(self, world: WorldModel, text: str) -> str:
         """Keep an event as an episode too; return why it could not, else nothing."""
@@ -381,7 +381,7 @@ def _without(
     label: str, query: EpisodeQuery, find: Callable[[EpisodeQuery], EpisodePage]
 ) -> EpisodePage:
     """Return a page of what passes a query and shows nothing of that label."""
-    every = find(replace(query, limit=MOST_COMPARED, offset=0))
+    every = find(replace(query, limit=ALL, offset=0))
     left = tuple(
         match
         for match in every.matches

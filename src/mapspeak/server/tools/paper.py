@@ -13,7 +13,6 @@ from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
 from mapspeak.places.goalcheck import FARTHEST_M
-from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall.asking import find_speaking_places
 from mapspeak.places.things import find_gone, forget_thing
 from mapspeak.robot import PoseDoubt
@@ -23,7 +22,7 @@ from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far
 from mapspeak.server.text.recall import say_advice, say_gone, say_placed
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
-from mapspeak.server.tools.annotating import Annotator, Landmarks
+from mapspeak.server.tools.annotating import Annotator, Landmarks, check_name
 from mapspeak.server.tools.sightings import fetch_ring
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
@@ -117,7 +116,7 @@ class PaperTools:
         A known name is updated: landmarks that you do not name stay. Leave out people, loose boxes
         and guesses.
         """
-        _check_name(name)
+        check_name(name)
         await self._session.meet_map()
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
@@ -129,7 +128,7 @@ class PaperTools:
         if pose.point == here.point:
             await self._add_laser(annotator, pose, picture, safety_landmarks, functional_landmarks)
         waypoint = Waypoint(
-            name=annotator.take_name(name),
+            name=name,
             description=annotator.take_description(description),
             pose=pose,
             safety_landmarks=annotator.take(safety_landmarks, pose=pose, picture=picture),
@@ -266,11 +265,3 @@ def _observation_pose(
             hint="Give metres in the map frame, or leave x and y out for the robot's own pose.",
         )
     return Pose(x, y, yaw_rad)
-
-
-def _check_name(name: str) -> None:
-    if is_taken_name(name):
-        raise SemanticMapError(
-            f"{name!r} reads like an id, coordinates or the robot itself.",
-            hint="Give a name in words, such as 'dock corner'.",
-        )

@@ -6,7 +6,6 @@ from mcp_types import CallToolResult, TextContent
 from pydantic import Field
 
 from mapspeak.errors import GoalError
-from mapspeak.geometry import Point
 from mapspeak.memory.search.answer import EntryKind
 from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import check_place, find_place
@@ -148,7 +147,7 @@ class FindTools:
             begin, end = read_past(since, until, now)
             wanted = RecallQuery(
                 words=words if room is None else query,
-                near=None if near is None else find_point(world, near),
+                near=None if near is None else find_place(world, near).point,
                 room_id=room_id if room is None else find_room(world, room),
                 since=begin,
                 until=end,
@@ -174,15 +173,6 @@ class FindTools:
             content=[TextContent(type="text", text=report.text)],
             structured_content=report.model_dump(mode="json"),
         )
-
-
-def find_point(world: WorldModel, words: str) -> Point:
-    """Return the point of a named place.
-
-    Raises:
-        GoalError: There is no such place.
-    """
-    return find_place(world, words).point
 
 
 def find_room(world: WorldModel, words: str) -> str:

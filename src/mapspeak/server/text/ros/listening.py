@@ -12,7 +12,7 @@ from mapspeak.ros.census import Census, Nodes
 from mapspeak.ros.listening import Heard
 from mapspeak.ros.messages.fields import Dialect, Message, find_stamp
 from mapspeak.ros.port import EndQuality, NodeLinks, OwnEnds, RosConnection, RosGraph, TopicQuality
-from mapspeak.server.text.wording import list_some
+from mapspeak.server.text.wording import list_some, say_count
 
 LATE_PERIODS = 3.0
 LEAST_LATE_S = 0.5
@@ -91,7 +91,7 @@ def say_measured(heard: Heard, *, now_s: float, n_bytes: int | None) -> str:
         now_s: Robot time.
         n_bytes: Of the latest on ROS's own wire; None where its type is not described.
     """
-    many = "1 message" if heard.n_received == 1 else f"{heard.n_received} messages"
+    many = say_count(heard.n_received, "message")
     rate = f"{say_rate(heard.rate_hz)}, {many}" if heard.n_received > 1 else many
     rate += f", {_say_size(n_bytes, heard)}"
     stopped = f"; STOPPED, the last {heard.age_s:.1f} s ago" if heard.has_stopped else ""

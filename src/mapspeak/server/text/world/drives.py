@@ -186,7 +186,7 @@ def _say_progress(progress: Progress) -> str:
         return _say_seen(progress.seen_id, progress)
     match progress.state:
         case ExplorationState.BOUND_REACHED:
-            return _say_bound(progress)
+            return f"{_say_reached(progress)}{_say_left(progress)}"
         case ExplorationState.NOTHING_LEFT:
             return f"Nothing is left to explore{_say_not_worth(progress.not_worth)}."
         case ExplorationState.REST_UNREACHABLE:
@@ -215,11 +215,6 @@ def _say_left(progress: Progress) -> str:
         f" Left: {len(progress.frontiers)} frontiers with about {total_m2:.1f} m2 to see, most at "
         f"{most.id} ({most.gain_m2:.1f} m2)."
     )
-
-
-def _say_bound(progress: Progress) -> str:
-    """Say which bound was reached, and what it leaves."""
-    return f"{_say_reached(progress)}{_say_left(progress)}"
 
 
 def _say_reached(progress: Progress) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from mapspeak.robot import NavigationLook, NavigationPart
+from mapspeak.server.text.wording import say_count
 from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierMerit,
@@ -19,8 +20,7 @@ from mapspeak.spatial.rooms import Door, Region, RoomClass
 
 def say_size(region: Region) -> str:
     """Say how large a region is, and how many doors it has: why it is of its kind."""
-    n_doors = len(region.door_ids)
-    doors = "1 door" if n_doors == 1 else f"{n_doors} doors"
+    doors = say_count(len(region.door_ids), "door")
     size = f"{region.length_m:.1f} x {region.width_m:.1f} m, {doors}"
     if region.room_class is RoomClass.OPEN_SPACE:
         return f"{size}, {2 * region.clearance_m:.2g} m wide at the widest"
@@ -181,9 +181,8 @@ def say_verdict(report: FrontierReport) -> str:
             others = _count_refused(report) or "specks too short to be more than noise"
             return f"No frontier is left to go to; not offered: {others}."
         case FrontierVerdict.SOME_LEFT:
-            n_left = len(report.frontiers)
             others = f"; not offered: {_count_refused(report)}" if report.refused else ""
-            return f"{n_left} frontier{'s' if n_left > 1 else ''}{others}."
+            return f"{say_count(len(report.frontiers), 'frontier')}{others}."
 
 
 def _count_refused(report: FrontierReport) -> str:

@@ -11,7 +11,7 @@ from mapspeak.server.text.ros.listening import list_page, say_loss
 from mapspeak.server.text.ros.outcomes import NO_TYPE_TOLD, ONE_OF_BOTH, say_goal, say_goals
 from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.wording import say_count
-from mapspeak.server.tools.caller import LONGEST_WAIT_S
+from mapspeak.server.tools.caller import WaitForEnd
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.publishing import check_frames
@@ -29,7 +29,6 @@ GoalFields = Annotated[
 ActionType = Annotated[
     str | None, Field(description="only where the robot does not tell it", max_length=200)
 ]
-Wait = Annotated[float, Field(description="seconds to wait for its end", ge=0, le=LONGEST_WAIT_S)]
 Handle = Annotated[
     str | None, Field(description="such as A1; the latest when left out", max_length=40)
 ]
@@ -77,7 +76,7 @@ class ActionTools:
         self,
         action: Action,
         fields: GoalFields,
-        wait_s: Wait = 5.0,
+        wait_s: WaitForEnd = 5.0,
         type: ActionType = None,  # noqa: A002
     ) -> str:
         """Send a goal to a ROS action, which may move the robot, and wait for its end.
@@ -103,7 +102,7 @@ class ActionTools:
 
     @tool("How a ROS goal stands", ToolEffect.READS)
     async def ros_goal_status(
-        self, goal_id: Handle = None, wait_s: Wait = 0.0, action: AnyAction = None
+        self, goal_id: Handle = None, wait_s: WaitForEnd = 0.0, action: AnyAction = None
     ) -> str:
         """Say how a ROS goal stands: state, feedback, result, also long after.
 

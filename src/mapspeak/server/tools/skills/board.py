@@ -13,7 +13,7 @@ from mapspeak.errors import MapspeakError, SkillError
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import say_error
 from mapspeak.server.text.skills import describe_skill
-from mapspeak.server.tools.caller import LONGEST_WAIT_S
+from mapspeak.server.tools.caller import LONGEST_WAIT_S, shorten_wait
 from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter
@@ -119,7 +119,7 @@ class SkillBoard:
         try:
             wait_s = LONGEST_WAIT_S
             if _is_long(skill):
-                given = own.pop(WAIT.name, WAIT.default)
+                given = shorten_wait(own.pop(WAIT.name, WAIT.default))
                 wait_s = check_value(WAIT, given, where=WAIT.name, what=name)
             run = await self.runs.begin(
                 skill,

@@ -5,7 +5,7 @@ from datetime import datetime
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Point
 from mapspeak.places.naming import find_named
-from mapspeak.server.tools.places import find_point
+from mapspeak.places.relations.choosing import find_place
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.session import Session
 
@@ -46,7 +46,8 @@ class SessionFacts:
             return await self._session.skilled.fetch_battery()
         if self._session.ros is None:
             return None
-        if self._battery is None or self.now_s - self._battery[1] > KEPT_S:
+        # A simulation that is begun anew sets its clock back.
+        if self._battery is None or not 0.0 <= self.now_s - self._battery[1] <= KEPT_S:
             self._battery = (await self._hear_battery(), self.now_s)
         return self._battery[0]
 
@@ -68,33 +69,35 @@ class SessionFacts:
         """Return True while no drive is under way."""
         return not self._session.drives.is_busy
 
-    async def is_in(self, room: str) -> bool:
+    async def is_in(self, room: str) -> bool | None:
         """Return True where the robot is in a room, by its id or its name."""
         here = await self._here()
         try:
             world = await self._session.fetch_world_model()
         except (LinkError, MapError):
-            return False
+            return None
         found = await self._session.compute(lambda: world.find_room_id(here))
-        if found is None or found == room.strip().upper():
-            return found is not None
+        if found == room.strip().upper():
+            return True
         place = find_named(world, room)
-        return place is not None and world.find_room_id(place.point) == found
+        if place is None:
+            return None
+        return found is not None and world.find_room_id(place.point) == found
 
-    async def is_near(self, place: str, within_m: float) -> bool:
+    async def is_near(self, place: str, within_m: float) -> bool | None:
         """Return True where the robot is so near to a place, in a straight line."""
         try:
             world = await self._session.fetch_world_model()
-            point = await self._session.compute(lambda: find_point(world, place))
+            point = await self._session.compute(lambda: find_place(world, place).point)
         except (GoalError, LinkError, MapError):
-            return False
+            return None
         return (await self._here()).distance_to(point) <= within_m
 
-    async def has_event(self, words: str) -> bool:
+    async def has_event(self, words: str) -> bool | None:
         """Return True while an event lasts in whose words these stand."""
         now, wanted = self.read_calendar(), words.casefold().split()
         if now is None:
-            return False
+            return None
         for event in self._session.recall_events():
             begins, until = event.find_time(now)
             lasts = (begins is None or begins <= now) and (until is None or now < until)
@@ -103,8 +106,10 @@ class SessionFacts:
                 return True
         return False
 
-    async def sees(self, label: str) -> bool:
+    async def sees(self, label: str) -> bool | None:
         """Return True where the robot's detector reports such a thing now."""
+        if self._session.robot.description.detector is None:
+            return None
         wanted = label.casefold()
         found = await self._session.robot.fetch_detections()
         return any(wanted in each.label.casefold() for each in found)

@@ -11,7 +11,7 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.ros.values import cut, show_message
 from mapspeak.server.text.skills import CODES, GOES_ON, say_conditions, say_remark, say_waiting
 from mapspeak.server.text.wording import say_count
-from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
+from mapspeak.server.tools.caller import WaitForEnd
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import SkillOutcome, SkillState
 from mapspeak.skills.questions import QuestionBook
@@ -22,11 +22,6 @@ Handle = Annotated[
     str | None, Field(description="such as S1; the latest when left out", max_length=40)
 ]
 OwnHandle = Annotated[str, Field(description="such as S1", max_length=40)]
-Wait = Annotated[
-    float,
-    Field(description="seconds to wait for its end", ge=0, le=LONGEST_WAIT_S),
-    AT_MOST_LONGEST_WAIT,
-]
 
 
 class SkillRunTools:
@@ -36,7 +31,9 @@ class SkillRunTools:
         self._runs = runs
 
     @tool("How a skill stands", ToolEffect.READS)
-    async def skill_status(self, context: Context, run: Handle = None, wait_s: Wait = 0.0) -> str:
+    async def skill_status(
+        self, context: Context, run: Handle = None, wait_s: WaitForEnd = 0.0
+    ) -> str:
         """Say how a run of a skill stands: state, progress, result, also long after.
 
         Use it to wait for the end.
