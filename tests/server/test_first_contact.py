@@ -1,8 +1,10 @@
 """What a client is told of an earlier session's memory, in its first answer."""
 
+import threading
 from datetime import timedelta
 from pathlib import Path
 
+import anyio
 import numpy as np
 import pytest
 from mcp.client import Client
@@ -11,6 +13,7 @@ from alignment_maps import HOUSE
 from fakes import FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, make_guard
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMap, SemanticMapStore
 from mapspeak.safety import Guard
 from mapspeak.spatial import OccupancyGrid
 from served import connect, report_of, text_of
@@ -68,3 +71,25 @@ async def test_places_of_another_map_are_told_as_such(tmp_path: Path) -> None:
     async with connect(FakeRobot(upset), tmp_path, guard=_guard(tmp_path)) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
     assert text.startswith("Memory: 1 place remembered before, the last 0 s ago, not on this map")
+
+
+class SlowStore(SemanticMapStore):
+    """A memory that is not read before a test says so."""
+
+    may_read = threading.Event()
+
+    def read(self) -> SemanticMap:
+        self.may_read.wait()
+        return super().read()
+
+
+async def test_a_stop_does_not_wait_for_the_memory(tmp_path: Path) -> None:
+    robot, memory = FakeRobot(two_rooms()), SlowStore(tmp_path / "map.yaml")
+    async with connect(robot, tmp_path, memory=memory) as client:
+        try:
+            with anyio.fail_after(20.0):
+                answer = await client.call_tool("stop_robot", {})
+        finally:
+            memory.may_read.set()
+    assert not answer.is_error
+    assert robot.n_stops == 1

@@ -135,9 +135,13 @@ class MapspeakServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         session_id = "" if context is None else client_of(context)
         caller = Caller(client=name_client(context), tool=name, session=session_id)
+        tool = self._offered.get(name)
+        # What stops waits for no memory.
+        has_remarks = tool is None or tool.effect is not ToolEffect.STOPS
         with self._session.client_is_heard(), calling(caller), offering(self._offered):
             self._check_arguments(name, arguments)
-            await self._remarks.meet(caller.client)
+            if has_remarks:
+                await self._remarks.meet(caller.client)
             try:
                 answer = await self._call_with_approval(name, arguments, context)
             except ToolError as error:
@@ -151,8 +155,10 @@ class MapspeakServer(MCPServer[Any]):
             self._note_memory(name, arguments)
             if not isinstance(answer, CallToolResult):
                 return answer
-            told = await self._remarks.tell(caller.client, arguments, shorten_report(answer))
-            return show_controls_of(told)
+            answer = shorten_report(answer)
+            if has_remarks:
+                answer = await self._remarks.tell(caller.client, arguments, answer)
+            return show_controls_of(answer)
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Note in the audit log that a tool has changed the memory."""

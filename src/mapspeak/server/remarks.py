@@ -32,10 +32,12 @@ class Remarks:
         """Note the memory before the first call of a client."""
         if client not in self._found:
             try:
-                self._found[client] = await self._session.compute(self._session.memory.read)
+                found = await self._session.compute(self._session.memory.read)
             except SemanticMapError:
                 # The tools report its faults.
-                self._found[client] = None
+                found = None
+            # Another first call of the client may have been answered meanwhile.
+            self._found.setdefault(client, found)
 
     async def tell(
         self, client: str, arguments: Mapping[str, Any], answer: CallToolResult

@@ -76,7 +76,7 @@ def say_heard(heard: Heard, duration_s: float) -> str:
     if duration_s:
         stopped = f", the last {heard.age_s:.1f} s ago" if heard.has_stopped else ""
         return (
-            f"{heard.n_received} messages in {heard.listened_s:.1f} s, "
+            f"{say_count(heard.n_received, 'message')} in {heard.listened_s:.1f} s, "
             f"{say_rate(heard.rate_hz)}{stopped}; the "
             f"{'latest' if shown == 1 else f'latest {shown}, the newest last'}:"
         )

@@ -235,7 +235,8 @@ def say_goals(client: ActionClient, handles: Mapping[str, str], loss: str) -> st
     """
     ours = {at: f"ours, {handles.get(goal.id, 'of a drive')}" for at, goal in client.ours.items()}
     lines = [f"{at}: {state}, {ours.get(at, 'not ours')}" for at, state in client.listed.items()]
-    head = f"{say_count(len(lines), 'goal')}, by the server's ids:"
+    latest = f", the latest {MOST_LISTED}" if len(lines) > MOST_LISTED else ""
+    head = f"{say_count(len(lines), 'goal')}{latest}, by the server's ids:"
     return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *filter(None, [loss])])
 
 
