@@ -1,3 +1,4 @@
+import shutil
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,6 +18,7 @@ from mapspeak.memory.episodes.observation import (
     EpisodeFilter,
     EpisodeOrder,
     EpisodeQuery,
+    MapPlacing,
     Observation,
     ObservationKind,
     observation_of,
@@ -169,6 +171,47 @@ def test_pages_do_not_shift_while_others_write(store: EpisodeStore) -> None:
     assert [match.observation.text for match in rest.matches] == ["A ladder leans on the rack."]
     assert rest.next_page is None
     assert store.find(EpisodeQuery()).n_matches == 5
+
+
+def test_pages_around_what_was_found_do_not_shift_while_it_is_seen_again_elsewhere(
+    store: EpisodeStore,
+) -> None:
+    page = store.find(EpisodeQuery(near=EpisodeQuery(label="fridge"), limit=2))
+    store.write(seen("The fridge again.", x=9.0, minutes=90, labels=("fridge",)))
+    assert page.next_page is not None
+
+    behind = store.find(page.next_page)
+
+    shown = [match.observation.id for match in (*page.matches, *behind.matches)]
+    assert len(set(shown)) == page.n_matches == 3
+
+
+def test_what_lies_on_a_map_of_unknown_placing_is_near_to_nothing_and_in_no_room(
+    store: EpisodeStore,
+) -> None:
+    store.write(replace(seen("A yard.", x=1.0), map_id="yard", id=""))
+    of_hall = EpisodeQuery(near=Point(1.0, 0.0), placings=(MapPlacing("hall", Pose(0.0, 0.0)),))
+
+    *nearest, last = store.find(of_hall).matches
+
+    assert [match.distance_m for match in nearest] == [0.0, 1.0, 7.0, 8.0]
+    assert (last.observation.text, last.is_elsewhere, last.distance_m) == ("A yard.", True, None)
+    assert EpisodeFilter.PLACE not in last.filters
+    assert "A yard." not in texts(store, replace(of_hall, near=None, room_id="R1"))
+
+
+def test_while_the_placing_of_no_map_is_known_all_is_told_as_elsewhere(store: EpisodeStore) -> None:
+    matches = store.find(EpisodeQuery(near=Point(1.0, 0.0), placings=())).matches
+
+    assert [match.is_elsewhere for match in matches] == [True] * 4
+
+
+def test_a_folder_that_was_taken_away_meanwhile_is_begun_anew(store: EpisodeStore) -> None:
+    shutil.rmtree(store.folder)
+
+    store.write(seen("A bin."))
+
+    assert texts(store, EpisodeQuery()) == ["A bin."]
 
 
 def test_a_rank_that_is_given_decides_what_fits(store: EpisodeStore) -> None:

@@ -130,7 +130,7 @@ class EpisodeDatabase:
 
     def _make(self) -> None:
         """Create the file if there is none, and keep it open."""
-        if self._is_held_open:
+        if self._is_held_open and self.path.exists():
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
         # Created under another name, so that readers find all of it or nothing.

@@ -196,7 +196,9 @@ def placed(seen: Observation, placings: Iterable[MapPlacing] | None) -> EpisodeM
             room_id = seen.room_id if is_still else None
             here = replace(seen, pose=placing.motion @ seen.pose, room_id=room_id)
             return EpisodeMatch(observation=here)
-    return EpisodeMatch(observation=seen, is_elsewhere=placings is not None)
+    is_elsewhere = placings is not None
+    room_id = None if is_elsewhere else seen.room_id
+    return EpisodeMatch(observation=replace(seen, room_id=room_id), is_elsewhere=is_elsewhere)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,7 @@
 import json
 import math
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta, timezone
 
@@ -37,7 +37,7 @@ _ORDERS = {
     EpisodeOrder.NEWEST: "o.recorded_us DESC, o.n DESC",
     EpisodeOrder.OLDEST: "o.recorded_us, o.n",
     EpisodeOrder.BEST: "score DESC, o.recorded_us DESC, o.n DESC",
-    EpisodeOrder.NEAREST: "squared_m2, o.recorded_us DESC, o.n DESC",
+    EpisodeOrder.NEAREST: "squared_m2 NULLS LAST, o.recorded_us DESC, o.n DESC",
 }
 
 
@@ -58,37 +58,38 @@ class _Where:
 
 
 def _source(query: EpisodeQuery) -> str:
-    """Return the table to query, with poses moved into the map of the query.
+    """Return the table to query, with poses and rooms in the map of the query.
 
-    `here_x` and `here_y` are null for poses on maps of unknown placing, so that no comparison
-    matches them.
+    `here_x`, `here_y` and `room_id` are null for observations on maps of unknown placing, so that
+    no comparison matches them.
     """
     if query.placings is None:
         return _PLAIN
-    cases = {"x": "", "y": "", "yaw_rad": "", "room_id": ""}
-    known = []
+    moved: dict[str, list[str]] = {"x": [], "y": [], "yaw_rad": [], "room_id": []}
     for placing in query.placings:
-        m, name = placing.motion, _quoted(placing.map_id)
+        m, is_of_map = placing.motion, f"map_id IS {_quoted(placing.map_id)}"
         cos, sin = math.cos(m.yaw_rad), math.sin(m.yaw_rad)
-        is_still = m == Pose(0.0, 0.0)
-        known.append(f"map_id IS {name}")
-        moved = {
+        values = {
             "x": f"{m.x!r} + {cos!r} * x - {sin!r} * y",
             "y": f"{m.y!r} + {sin!r} * x + {cos!r} * y",
             "yaw_rad": f"yaw_rad + {m.yaw_rad!r}",
-            "room_id": "room_id" if is_still else "NULL",
+            "room_id": "NULL",
         }
-        for column, value in moved.items():
-            cases[column] += f" WHEN map_id IS {name} THEN {column if is_still else value}"
+        for column, value in values.items():
+            here = column if m == Pose(0.0, 0.0) else value
+            moved[column].append(f"WHEN {is_of_map} THEN {here}")
+    x, y, yaw_rad = (_chosen(moved[column], column) for column in ("x", "y", "yaw_rad"))
+    here_x, here_y, room_id = (_chosen(moved[column], "NULL") for column in ("x", "y", "room_id"))
     rest = "n, id, recorded_us, offset_s, stamp_s, map_id, kind, text, labels, picture, text_id"
-    here = ", ".join(f"CASE{cases[axis]} ELSE NULL END AS here_{axis}" for axis in ("x", "y"))
-    moved_columns = ", ".join(
-        f"CASE{case} ELSE {name} END AS {name}" for name, case in cases.items()
-    )
     return (
-        f"(SELECT {rest}, {moved_columns}, {here}, "  # noqa: S608 - our own numbers, quoted names
-        f"NOT ({' OR '.join(known)}) AS is_elsewhere FROM observations) AS o"
+        f"(SELECT {rest}, {x} AS x, {y} AS y, {yaw_rad} AS yaw_rad, {room_id} AS room_id, "  # noqa: S608 - our own numbers, quoted names
+        f"{here_x} AS here_x, {here_y} AS here_y, {here_x} IS NULL AS is_elsewhere "
+        "FROM observations) AS o"
     )
+
+
+def _chosen(cases: Sequence[str], otherwise: str) -> str:
+    return f"CASE {' '.join(cases)} ELSE {otherwise} END" if cases else otherwise
 
 
 def _quoted(text: str | None) -> str:
@@ -116,7 +117,7 @@ class EpisodeSearch:
             query = replace(query, as_of=newest or 0)
         near, anchor = query.near, None
         if isinstance(near, EpisodeQuery):
-            wanted = replace(near, limit=1, placings=query.placings)
+            wanted = replace(near, limit=1, placings=query.placings, as_of=query.as_of)
             anchor = next(iter(self.find(connection, wanted, rank).matches), None)
             if anchor is None:
                 return EpisodePage(matches=(), n_matches=0)
@@ -227,7 +228,7 @@ def _match(
     observation = observation_from(row)
     given = {
         EpisodeFilter.WORDS if rank is None else EpisodeFilter.MEANING: query.words,
-        EpisodeFilter.PLACE: near,
+        EpisodeFilter.PLACE: row["squared_m2"],
         EpisodeFilter.ROOM: query.room_id,
         EpisodeFilter.LABEL: query.label,
         EpisodeFilter.TIME: query.since or query.until,
@@ -241,7 +242,7 @@ def _match(
     return EpisodeMatch(
         observation=observation,
         score_ratio=row["score"],
-        distance_m=None if near is None else observation.pose.point.distance_to(near),
+        distance_m=None if row["squared_m2"] is None else math.sqrt(row["squared_m2"]),
         is_elsewhere=bool(row["is_elsewhere"]),
         filters=tuple(each for each, value in given.items() if value is not None),
         fitting=tuple(fitting),
