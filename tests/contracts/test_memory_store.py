@@ -177,6 +177,21 @@ def test_a_place_takes_the_name_of_a_forgotten_one_but_of_no_other(
     assert not any(each.is_gone for each in store.read().waypoints)
 
 
+def test_a_new_look_at_a_forgotten_place_brings_back_nothing_that_was_forgotten_with_it(
+    store: MemoryStore,
+) -> None:
+    store.write(replace(place("gate", 1.0, HOSE), geometric_features=("a corner",)))
+    forget_place(store, "gate")
+
+    receipt, merge = store.remember(place("gate", 1.0, TAP))
+
+    assert (receipt.previous, merge.kept) == (None, ())
+    gate = store.read().present().waypoints[0]
+    assert (gate.landmarks, gate.geometric_features) == ((TAP,), ())
+    restore(store, "hose")
+    assert [each.label for each in store.read().present().waypoints[0].landmarks] == ["tap", "hose"]
+
+
 def test_what_many_remember_of_one_place_at_once_is_all_there(open_store: OpenStore) -> None:
     stores = [open_store("b1") for _ in range(4)]
 
@@ -302,6 +317,15 @@ def test_a_name_of_an_aligned_frame_is_the_same_place_and_keeps_its_frame(
     assert receipt.waypoint.frame is None
     assert receipt.waypoint.pose.x == 8.0
     assert names(store) == ["dock"]
+
+
+def test_the_id_of_a_room_means_nothing_in_the_frame_of_another_map(store: MemoryStore) -> None:
+    store.write(replace(place("dock"), room_id="R1"))
+    store.write_frames(lambda frames: frames.added(MapFrame(id="F2", pose=Pose(5.0, 0.0))))
+
+    receipt = store.write(replace(place("dock", -4.0), frame="F2", room_id="R7"))
+
+    assert (receipt.waypoint.frame, receipt.waypoint.room_id) == (None, None)
 
 
 def test_an_event_stays_in_its_frame_when_it_is_changed(store: MemoryStore) -> None:

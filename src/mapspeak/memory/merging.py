@@ -232,10 +232,14 @@ def _as_gone(views: Views) -> Views:
 
 
 def _find_past(before: Waypoint, landmarks: Iterable[Landmark], now: Waypoint) -> Views:
-    """Return what was gone before, but for what is seen again: that is there, as something new."""
+    """Return what was gone before, but for what is seen again: that is there, as something new.
+
+    With a forgotten place all that was seen from there is gone.
+    """
     back = {name_key(each.label) for each in now.landmarks}
-    past = tuple(each for each in landmarks if each.is_gone and name_key(each.label) not in back)
-    return _noted(_dated_views(before, past), now)
+    gone = (each for each in landmarks if before.is_gone or each.is_gone)
+    past = tuple(each for each in gone if name_key(each.label) not in back)
+    return _noted(_dated_views(before, _as_gone(past)), now)
 
 
 def _dated_views(waypoint: Waypoint, views: Views) -> Views:

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from mapspeak.errors import MapError, SemanticMapError
+from mapspeak.memory.store.durable import sync_folder
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map
@@ -73,10 +74,12 @@ class WallFolder:
             for path in (picture, new):
                 with path.open("rb+") as file:
                     os.fsync(file.fileno())
-            if is_first and not _is_linked(new, self.path / name):
+            target = self.path / Path(name).name
+            if is_first and not _is_linked(new, target):
                 return False
             if not is_first:
-                new.replace(self.path / name)
+                new.replace(target)
+            sync_folder(self.path)
             for other in self.path.glob(f"{Path(name).stem}-????????.pgm"):
                 if other != picture:
                     other.unlink(missing_ok=True)

@@ -112,7 +112,11 @@ class Waypoint:
         return self.safety_landmarks + self.functional_landmarks
 
     def present(self) -> "Waypoint":
-        """Return it without the landmarks that are gone."""
+        """Return it without what is gone: of a forgotten place only where it was is left."""
+        if self.is_gone:
+            return replace(
+                self, safety_landmarks=(), functional_landmarks=(), geometric_features=()
+            )
         if not any(each.is_gone for each in self.landmarks):
             return self
         return replace(

@@ -169,6 +169,18 @@ def test_records_of_another_map_are_not_here(
     assert (here(memory), elsewhere(memory)) == ([], ["dock", "sink"])
 
 
+@pytest.mark.parametrize("name", ["../places.yaml", "maps/old.yaml"])
+def test_walls_are_kept_in_their_folder_wherever_a_file_says_that_they_are(
+    store: SemanticMapStore, name: str
+) -> None:
+    store.path.write_text(f"map: house\nsnapshot: {name}\n")
+
+    opened(store, MAP).write(DOCK)
+
+    assert here(opened(store, MAP)) == ["dock"]
+    assert elsewhere(opened(store, MOVED)) == ["dock"]
+
+
 def test_a_map_that_jumps_takes_no_record_along(memory: FramedMemory) -> None:
     memory.meet(MOVED)
 

@@ -43,6 +43,16 @@ def test_a_copy_says_what_the_memory_says(source: SemanticMapStore, tmp_path: Pa
     assert (walls.cells == WALLS.cells).all()
 
 
+def test_a_memory_of_events_alone_is_of_the_same_map_when_it_is_copied(tmp_path: Path) -> None:
+    source = SemanticMapStore(tmp_path / "source.yaml", map_id="house")
+    source.write_event(Event(text="wet"))
+    target = SemanticMapStore(tmp_path / "target.yaml")
+
+    copy_memory(source, target)
+
+    assert target.read().map_id == "house"
+
+
 def test_nothing_is_copied_into_a_memory_that_says_something(
     source: SemanticMapStore, tmp_path: Path
 ) -> None:

@@ -322,6 +322,14 @@ def test_two_waypoints_of_one_name_are_reported_with_both_lines() -> None:
     assert 'Two waypoints are called "dock". The other one is on line 2.' in message
 
 
+def test_an_event_without_an_id_gets_one_that_no_other_names() -> None:
+    text = "events:\n  - text: wet\n  - text: dark\n  - {text: dry, id: E1}\n"
+
+    document = parse_document(text.encode(), source="places.yaml")
+
+    assert list(document.lists["events"]) == ["E2", "E3", "E1"]
+
+
 def test_a_byte_that_is_not_utf_8_is_reported_with_its_line() -> None:
     with pytest.raises(SemanticMapError, match=r"places.yaml, line 2: byte 14 is not UTF-8"):
         parse_document(b"version: 1\na: \xe9\n", source="places.yaml")

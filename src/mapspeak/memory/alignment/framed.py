@@ -141,9 +141,8 @@ class FramedMemory(MemoryStore):
         before = receipt.previous and self._place(receipt.previous, frames)
         assert written is not None  # noqa: S101 - it was just written in this frame or one aligned
         # The room of a present sighting is a room of the robot's map.
-        room_id = receipt.waypoint.room_id
         return WriteReceipt(
-            waypoint=replace(written, room_id=room_id).present(),
+            waypoint=replace(written, room_id=waypoint.room_id).present(),
             previous=before and before.present(),
         )
 

@@ -201,7 +201,7 @@ class MapDocument(Contents):
 
     def _read_item(self, list_key: str, text: str, data: dict[str, Data]) -> ListedRecord:
         """Return a record as read from its new text."""
-        item = read_item(list_key, text, str(data.get("id")), self.map_id)
+        item = read_item(list_key, text, self.map_id)
         if data_of(item.record) != data:
             raise self._layout_fault(list_key)
         return item

@@ -25,6 +25,7 @@ class WriteReceipt:
 
     Attributes:
         waypoint: As remembered, rounded to millimetres and hundredths of a degree.
+        previous: The one of its name before; None where there was none or it was forgotten.
     """
 
     waypoint: Waypoint
@@ -192,7 +193,8 @@ class MemoryStore(ABC):
             placed = _in_its_frame(waypoint, records)
             previous = records.find_place(name_key(placed.name))
             written = records.put(join(previous, placed))
-            return WriteReceipt(waypoint=written, previous=previous)
+            is_new = previous is None or previous.is_gone
+            return WriteReceipt(waypoint=written, previous=None if is_new else previous)
 
         return self.change(write, binding=map_id)
 
@@ -210,7 +212,7 @@ def _in_its_frame(waypoint: Waypoint, records: Records) -> Waypoint:
             return replace(waypoint, name=name)
         placed = records.frames.bring(waypoint, known.frame)
         if placed is not None:
-            return replace(placed, name=name, room_id=waypoint.room_id)
+            return replace(placed, name=name)
     raise AssertionError  # There is always a free number.
 
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import cast
 
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.memory.events import Event
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.store.cutting import Section, cut, read_plain_record
 from mapspeak.memory.store.records import (
@@ -143,14 +145,15 @@ def _read_list(
             return _first_line(list_key, sections, number)
         return _line_in_file(nodes[number].start_mark.line + 1, sections)
 
-    items = dict[str, ListedRecord]()
+    read = list[ListedRecord]()
     for number, each in enumerate(texts or nodes):
-        default_id = f"E{number + 1}"
         try:
-            item = by_text.get(each) or read_item(list_key, each, default_id, map_id)
+            read.append(by_text.get(each) or read_item(list_key, each, map_id))
         except TextFaultError as fault:
             first = 1 if texts else nodes[number].start_mark.line + 1
             raise fault.moved(find_line(number) - first) from fault
+    items = dict[str, ListedRecord]()
+    for number, item in enumerate(_with_ids(read)):
         if item.key in items:
             other = list(items).index(item.key)
             raise _twins(list_key, item, line=find_line(number), other_line=find_line(other))
@@ -181,16 +184,26 @@ def _twins(list_key: str, item: ListedRecord, *, line: int, other_line: int) -> 
     )
 
 
-def read_item(
-    list_key: str, place: str | Node, default_id: str, map_id: str | None
-) -> ListedRecord:
+def _with_ids(items: list[ListedRecord]) -> Iterator[ListedRecord]:
+    """Return items, where an event that names no id has the first free one from its number on."""
+    taken = {item.key for item in items}
+    for number, item in enumerate(items, start=1):
+        if item.key or not isinstance(item.record, Event):
+            yield item
+            continue
+        key = next(key for n in count(number) if (key := f"E{n}") not in taken)
+        taken.add(key)
+        yield replace(item, record=replace(item.record, id=key), key=key)
+
+
+def read_item(list_key: str, place: str | Node, map_id: str | None) -> ListedRecord:
     """Read a record from its text, or where it is laid out in another way, from its node."""
     text = place if isinstance(place, str) else None
     data: Data = None if text is None else read_plain_record(text)
     node = None if data is not None else _node_of(list_key, place)
     data = data_of(node) if node is not None else data
     try:
-        record = read_record(list_key, data, map_id, default_id=default_id)
+        record = read_record(list_key, data, map_id)
     except SemanticMapError as error:
         path = error.path if isinstance(error, WrongRecordError) else ()
         line, column = locate(node or _node_of(list_key, place), path)

@@ -6,7 +6,7 @@ map file, the rows of a database and GeoJSON hold the same records.
 
 import difflib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
@@ -309,21 +309,17 @@ def key_of(record: Record) -> str:
     return name_key(record.name) if isinstance(record, Waypoint) else record.id
 
 
-def read_record(list_key: str, data: Data, map_id: str | None, *, default_id: str = "") -> Record:
+def read_record(list_key: str, data: Data, map_id: str | None) -> Record:
     """Return the value that a record describes.
 
     Args:
         map_id: The map that a place of this memory is on.
-        default_id: Of an event that names none.
 
     Raises:
         SemanticMapError: The record does not say what it must.
     """
     more = {"map_id": map_id} if list_key == "waypoints" else {}
-    record = cast("Record", LISTS[list_key].read(data, **more))
-    if isinstance(record, Event) and not record.id:
-        return replace(record, id=default_id)
-    return record
+    return cast("Record", LISTS[list_key].read(data, **more))
 
 
 def data_of(record: Record) -> dict[str, Data]:
