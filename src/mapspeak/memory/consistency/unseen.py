@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import cached_property
-from itertools import chain, islice
+from itertools import chain, compress, islice
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.thing import Thing
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
-from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.grid import FloatArray, Mask
 
 LEAST_SHOWN_RATIO = 0.25
 """A look that shows a thing less likely says nothing of it."""
@@ -148,7 +148,8 @@ class UnseenThings:
         if id(thing) not in self.known:
             number = self._number[id(thing)]
             off_m = np.hypot(*(self._looks_at - self.at[number]).T)
-            looks = [self._waypoints[i] for i in np.flatnonzero(off_m <= NEAR_M).tolist()]
+            near = [self._waypoints[i] for i in np.flatnonzero(off_m <= NEAR_M).tolist()]
+            looks = _find_ahead(near, thing)
             shown = (finding for look in looks for finding in self._not_shown(look, [number]))
             self.known[id(thing)] = (*self._missed(thing), *shown)
         return self.known[id(thing)]
@@ -266,18 +267,42 @@ def _measure_shown(
     found: Things, waypoint: Waypoint, things: Sequence[Thing], cone: tuple[float, float]
 ) -> FloatArray:
     """Return how likely a look shows each thing: over all that it may be, near, ahead, in sight."""
-    spots = [np.empty((0, 2)) if each.whereabouts is None else each.whereabouts for each in things]
+    spots = [_spots_of(each) for each in things]
     points = np.concatenate([np.empty((0, 2)), *spots])
-    pose = waypoint.pose
-    east, north = (points - (pose.x, pose.y)).T
-    off_rad = np.remainder(np.arctan2(north, east) - pose.yaw_rad + np.pi, 2 * np.pi) - np.pi
-    is_ahead = (cone[0] <= off_rad) & (off_rad <= cone[1]) & (np.hypot(east, north) <= NEAR_M)
-    in_sight = is_ahead * found.find_sight_ratios(waypoint, points)
+    ahead = np.flatnonzero(_are_ahead([waypoint], [cone], points))
+    in_sight = np.zeros(len(points))
+    in_sight[ahead] = found.find_sight_ratios(waypoint, points[ahead])
     n_spots = np.array([len(each) for each in spots], dtype=np.intp)
     sums = np.bincount(
         np.repeat(np.arange(len(spots)), n_spots), weights=in_sight, minlength=len(spots)
     )
     return sums / np.maximum(n_spots, 1)
+
+
+def _find_ahead(looks: Sequence[Waypoint], thing: Thing) -> list[Waypoint]:
+    """Return the looks with so much ahead of where a thing may be that they might show it."""
+    cones = [find_cone(look) or (np.inf, -np.inf) for look in looks]
+    spots = _spots_of(thing)
+    n_ahead = _are_ahead(looks, cones, spots).sum(axis=1)
+    is_enough = (n_ahead >= LEAST_SHOWN_RATIO * max(len(spots), 1)).tolist()
+    return list(compress(looks, is_enough))
+
+
+def _are_ahead(
+    looks: Sequence[Waypoint], cones: Sequence[tuple[float, float]], points: FloatArray
+) -> Mask:
+    """Return True for each look (row) and point (column) that is near and in the look's cone."""
+    poses = np.array([(look.pose.x, look.pose.y, look.pose.yaw_rad) for look in looks])
+    x, y, yaws = poses.reshape(-1, 3, 1).transpose(1, 0, 2)
+    least, most = np.array(cones).reshape(-1, 2, 1).transpose(1, 0, 2)
+    east, north = points[:, 0] - x, points[:, 1] - y
+    off_rad = np.remainder(np.arctan2(north, east) - yaws + np.pi, 2 * np.pi) - np.pi
+    is_near = np.hypot(east, north) <= NEAR_M
+    return np.asarray((least <= off_rad) & (off_rad <= most) & is_near)
+
+
+def _spots_of(thing: Thing) -> FloatArray:
+    return np.empty((0, 2)) if thing.whereabouts is None else thing.whereabouts
 
 
 def _is_newer(new: Thing, old: Thing) -> bool:
