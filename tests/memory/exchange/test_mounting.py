@@ -1,6 +1,7 @@
 """Memories of one building or of two, each on the map of its own robot, as one."""
 
 import math
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -103,7 +104,7 @@ def test_a_memory_joined_with_a_copy_of_itself_on_the_same_map_stays_the_same(
     assert sorted(each.name for each in opened(out, MAP).read().waypoints) == ["dock", "sink"]
 
 
-def test_frames_of_a_second_memory_get_ids_of_their_own(first: Path, tmp_path: Path) -> None:
+def test_frames_of_a_second_memory_are_those_of_the_first_with_their_walls(first: Path, tmp_path: Path) -> None:
     opened(first, OTHER).write(Waypoint(name="oven", pose=SINK))
     second = made(tmp_path / "b.yaml", OTHER, {"hob": SINK})
     opened(second, MAP).write(Waypoint(name="tap", pose=SINK))
@@ -112,8 +113,52 @@ def test_frames_of_a_second_memory_get_ids_of_their_own(first: Path, tmp_path: P
     merge_files(first, second, out=out)
 
     frames = {each.name: each.frame for each in SemanticMapStore(out).read().waypoints}
-    assert frames == {"dock": None, "oven": "F2", "hob": "F2", "tap": "F3"}
+    assert frames == {"dock": None, "oven": "F2", "hob": "F2", "tap": None}
     assert sorted(each.name for each in opened(out, OTHER).read().waypoints) == ["hob", "oven"]
+    assert sorted(each.name for each in opened(out, MAP).read().waypoints) == ["dock", "tap"]
+
+
+def test_a_memory_with_frames_joined_with_a_copy_of_itself_stays_the_same(
+    first: Path, tmp_path: Path
+) -> None:
+    opened(first, OTHER).write(Waypoint(name="oven", pose=SINK))
+    copy = tmp_path / "copy.yaml"
+    shutil.copy(first, copy)
+    shutil.copytree(tmp_path / "a.memory", tmp_path / "copy.memory")
+
+    merge_files(first, copy, out=tmp_path / "c.yaml")
+
+    united = SemanticMapStore(tmp_path / "c.yaml").read()
+    assert [(each.name, each.frame) for each in united.waypoints] == [("dock", None), ("oven", "F2")]
+
+
+def test_walls_tell_more_of_a_second_memory_than_the_name_of_its_map(tmp_path: Path) -> None:
+    first = tmp_path / "a.yaml"
+    SemanticMapStore(first, map_id="house").write(Waypoint(name="dock", pose=DOCK))
+    annex = FramedMemory(SemanticMapStore(first, map_id="annex"))
+    annex.meet(MAP)
+    annex.write(Waypoint(name="oven", pose=DOCK))
+    second = made(tmp_path / "b.yaml", MOVED, {"sink": MOTION @ SINK})
+
+    merge_files(first, second, out=tmp_path / "c.yaml")
+
+    sink = opened(tmp_path / "c.yaml", MAP).read().find_waypoint("sink")
+    assert sink is not None
+    assert sink.pose.point.distance_to(SINK.point) < 0.05
+
+
+def test_a_frame_without_an_entry_is_none_of_the_other_memory_s(tmp_path: Path) -> None:
+    entry = "frames:\n- {id: F2, pose: {x: 5, y: 0, yaw_deg: 0}}\n"
+    for name, frames in (("a", entry), ("b", "")):
+        place = f"- {{name: {name}, pose: {{x: 1, y: 1, yaw_deg: 0}}, frame: F2}}\n"
+        (tmp_path / f"{name}.yaml").write_text(f"map: house\nwaypoints:\n{place}{frames}")
+
+    merge_files(tmp_path / "a.yaml", tmp_path / "b.yaml", out=tmp_path / "c.yaml")
+
+    united = SemanticMapStore(tmp_path / "c.yaml").read()
+    of_second = united.waypoints[1].frame
+    assert united.frames.find_transform(of="F2", into=None) is not None
+    assert united.frames.find_transform(of=of_second, into=None) is None
 
 
 def test_merging_the_same_memory_again_adds_nothing(first: Path, tmp_path: Path) -> None:

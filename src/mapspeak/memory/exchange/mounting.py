@@ -21,7 +21,7 @@ class Mount:
 
     Attributes:
         frames: Of the united memory.
-        ids: New id of each frame of the second memory; its own frame is None.
+        ids: New id of each frame that the second memory names; its own frame is None.
         walls: The maps to keep beside the united memory, by name.
         finding: Relation of the two memories' own frames, in words.
     """
@@ -34,14 +34,14 @@ class Mount:
     def rename_places(self, places: SemanticMap) -> SemanticMap:
         """Return the second memory's places with their frames renamed."""
         waypoints = (
-            replace(each, frame=self.ids.get(each.frame, each.frame), map_id=None)
+            replace(each, frame=self.ids[each.frame], map_id=None)
             for each in places.waypoints
         )
         return replace(places, waypoints=tuple(waypoints), map_id=None)
 
     def rename_event(self, event: Event) -> Event:
         """Return an event of the second memory without its id and with its frame renamed."""
-        return replace(event, id="", frame=self.ids.get(event.frame, event.frame))
+        return replace(event, id="", frame=self.ids[event.frame])
 
     def rename_map(self, map_id: str | None, *, whole_map_id: str | None) -> str | None:
         """Return the new name of a map of the second memory's observations."""
@@ -54,40 +54,37 @@ class Mount:
 def mount(first: MemoryStore, second: MemoryStore) -> Mount:
     """Lay the frames of a second memory beside those of a first one.
 
-    The second memory's own frame becomes the first's if the walls of both agree unmoved or, without
-    walls, if both name the same map. Otherwise it stays a separate frame, with a pose if the walls
-    determine it surely.
+    A frame of the second memory becomes one of the first's if the walls of both agree unmoved; so
+    does its own frame if one of both has no walls and both name the same map. Any other stays a
+    separate frame, with a pose if the walls, or the second memory itself, determine it.
 
     Raises:
         SemanticMapError: A kept map is damaged.
     """
     whole, other = first.read(), second.read()
     mine, theirs = _load_kept(first), _load_kept(second)
-    found = _find_motion(theirs[None], mine) if None in theirs else None
     has_no_walls = None not in mine or None not in theirs
     is_named = has_no_walls and whole.map_id is not None and whole.map_id == other.map_id
-    if is_named or (found is not None and found[1] == STILL):
-        ids: dict[FrameId, FrameId] = {None: None if found is None else found[0]}
-        frames, finding = whole.frames, ""
-    else:
-        own = MapFrame(id=whole.frames.free_id(), map_id=other.map_id)
-        frames, ids = whole.frames.added(own), {None: own.id}
-        finding = (
-            "The second memory is of another map, or nothing tells how it lies: it stays apart, "
-            f"as the frame {own.id}."
-        )
+    frames, finding = whole.frames, ""
+    ids = dict[FrameId, FrameId]()
+    for frame in _list_frames(second):
+        frame_id = frame.id or None
+        found = _find_motion(theirs[frame_id], mine) if frame_id in theirs else None
+        is_own = frame_id is None and is_named and found is None
+        if is_own or (found is not None and found[1] == STILL):
+            ids[frame_id] = None if found is None else found[0]
+            continue
+        ids[frame_id] = new_id = frames.free_id()
+        frames = frames.added(replace(frame, id=new_id, walls=None, pose=None, reference=None))
         if found is not None:
-            frames = frames.aligned(own.id, found[0], motion=found[1])
-            finding = (
-                f"The second memory's map lies turned by {math.degrees(found[1].yaw_rad):.1f} "
-                f"degrees, its origin at ({found[1].x:.2f}, {found[1].y:.2f}), as its walls tell."
-            )
+            frames = frames.aligned(new_id, found[0], motion=found[1])
+        if frame_id is None:
+            finding = _say_mounted(new_id, found)
     for frame in other.frames.items:
-        ids[frame.id] = frames.free_id()
-        frames = frames.added(replace(frame, id=frames.free_id(), walls=None))
-    for frame in other.frames.items:
-        reference = ids.get(frame.reference, frame.reference)
-        frames = frames.changed(ids[frame.id] or "", reference=reference)
+        of, into = ids[frame.id], ids[frame.reference]
+        motion = other.frames.find_transform(of=frame.id, into=frame.reference)
+        if motion is not None and frames.find_transform(of=of, into=into) is None:
+            frames = frames.aligned(of, into, motion=motion)
     # Of two maps of one frame the first memory's is kept.
     kept = {ids[frame_id]: grid for frame_id, grid in theirs.items()} | mine
     walls = {}
@@ -97,6 +94,32 @@ def mount(first: MemoryStore, second: MemoryStore) -> Mount:
         if frame_id is not None:
             frames = frames.changed(frame_id, walls=name)
     return Mount(frames=frames, ids=ids, walls=walls, finding=finding)
+
+
+def _list_frames(store: MemoryStore) -> tuple[MapFrame, ...]:
+    """Return all frames that a memory names: its own, without an id, and those without an entry."""
+    memory = store.read()
+    entries = memory.frames.by_id
+    named = (
+        *entries,
+        *(frame.reference for frame in memory.frames.items),
+        *(record.frame for record in (*memory.waypoints, *store.read_events())),
+    )
+    others = dict.fromkeys(filter(None, named))
+    own = MapFrame(id="", map_id=memory.map_id)
+    return (own, *(entries.get(frame_id) or MapFrame(id=frame_id) for frame_id in others))
+
+
+def _say_mounted(new_id: str, found: tuple[FrameId, Pose] | None) -> str:
+    if found is None:
+        return (
+            "The second memory is of another map, or nothing tells how it lies: it stays apart, "
+            f"as the frame {new_id}."
+        )
+    return (
+        f"The second memory's map lies turned by {math.degrees(found[1].yaw_rad):.1f} "
+        f"degrees, its origin at ({found[1].x:.2f}, {found[1].y:.2f}), as its walls tell."
+    )
 
 
 def _find_motion(
