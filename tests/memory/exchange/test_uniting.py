@@ -146,6 +146,15 @@ def test_a_look_that_is_joined_again_misses_nothing_twice() -> None:
     assert unite(once, second).places.waypoints == once.waypoints
 
 
+def test_a_look_that_was_joined_with_an_earlier_one_is_joined_again_under_its_name() -> None:
+    tap = Landmark(label="tap", bearing_rad=0.0)
+    first = memory(dock(at=MONDAY, functional_landmarks=(tap,)))
+    second = memory(dock(0.7, at=TUESDAY, functional_landmarks=(TAP, tap)))
+    once = unite(first, second).places
+
+    assert names(unite(once, second).places) == ["dock"]
+
+
 def test_two_files_become_one_with_the_comments_of_the_first(tmp_path: Path) -> None:
     first, second, out = (tmp_path / name for name in ("a.yaml", "b.yaml", "c.yaml"))
     first.write_text(

@@ -93,6 +93,8 @@ def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
         # The first one's spelling of the name stays.
         return replace(_joined(older, newer), name=mine.name), f"joined, the record of {at} decides"
     joined = replace(_joined(theirs, mine), name=mine.name)
+    if mine.recorded_at is not None and mine.recorded_at == theirs.recorded_at and apart_m == 0:
+        return joined, "joined, both are of one look"
     if _unordered(joined) == _unordered(replace(_joined(mine, theirs), name=mine.name)):
         return joined, "joined, they complete each other"
     return None, "they differ, and which is newer is not known"
