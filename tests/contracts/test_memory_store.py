@@ -376,6 +376,23 @@ def test_walls_take_the_place_of_those_before_unless_they_are_to_be_the_first(
     assert replaced.cells.shape == (4, 4)
 
 
+def test_walls_that_two_robots_keep_at_once_can_be_read_throughout(open_store: OpenStore) -> None:
+    grids = [
+        OccupancyGrid(cells=np.full((2, 2), value, dtype=np.int8), resolution_m=0.1)
+        for value in (0, 100)
+    ]
+    open_store("b1").walls.keep(grids[0], "map.yaml")
+
+    def keep_and_load(grid: OccupancyGrid) -> bool:
+        walls = open_store("b1").walls
+        return all(
+            walls.keep(grid, "map.yaml") and walls.load("map.yaml") is not None for _ in range(30)
+        )
+
+    with ThreadPoolExecutor(2) as pool:
+        assert all(pool.map(keep_and_load, grids))
+
+
 def test_a_free_name_is_that_of_no_kept_walls(store: MemoryStore) -> None:
     first = store.walls.free_name()
     store.walls.keep(SMALL, first)

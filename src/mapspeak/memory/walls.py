@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from filelock import FileLock
 
 from mapspeak.errors import MapError, SemanticMapError
 from mapspeak.memory.store.durable import sync_folder
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map
+
+
+LOCK_TIMEOUT_S = 5.0
 
 
 class KeptWalls(Protocol):
@@ -69,6 +73,7 @@ class WallFolder:
         stem = f"{Path(name).stem}-{zlib.crc32(grid.cells.tobytes()):08x}"
         with self._explained():
             self.path.mkdir(exist_ok=True, parents=True)
+        with self._explained(), FileLock(self.path / "walls.lock", timeout=LOCK_TIMEOUT_S):
             new = self.path / f"{stem}.yaml"
             picture = write_map(grid, new)
             for path in (picture, new):
@@ -80,9 +85,10 @@ class WallFolder:
             if not is_first:
                 new.replace(target)
             sync_folder(self.path)
-            for other in self.path.glob(f"{Path(name).stem}-????????.pgm"):
-                if other != picture:
-                    other.unlink(missing_ok=True)
+            pictures = self.path.glob(f"{Path(name).stem}-????????.pgm")
+            # The one before stays: another program may have begun to read it.
+            for other in sorted(pictures, key=lambda each: each.stat().st_mtime_ns)[:-2]:
+                other.unlink()
         return True
 
     def free_name(self) -> str:

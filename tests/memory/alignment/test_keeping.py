@@ -14,6 +14,7 @@ from mapspeak.memory.alignment.comparing import MapRelation
 from mapspeak.memory.alignment.fitting import Certainty
 from mapspeak.memory.alignment.framed import FramedMemory
 from mapspeak.memory.events import Effect, Event
+from mapspeak.memory.walls import KeptWalls
 from mapspeak.server.text.findings import say_receipt
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
@@ -21,6 +22,10 @@ from mapspeak.spatial.mapfiles import load_map
 MOTION = Pose(3.0, -1.0, math.radians(40))
 TWICE = Pose(-2.0, 5.0, math.radians(-115))
 MAP, MOVED, OTHER = fine(HOUSE), moved(fine(HOUSE), MOTION), fine(OTHER_HOUSE)
+MAP_AND_YARD = OccupancyGrid(
+    cells=np.pad(MAP.cells, ((0, 0), (0, 60))), resolution_m=MAP.resolution_m, origin=MAP.origin
+)
+BLANK = OccupancyGrid(cells=MAP.cells[5:20, 5:20], resolution_m=0.1)
 MOVED_TWICE = moved(fine(HOUSE), TWICE)
 DOCK = Waypoint(
     name="dock",
@@ -101,6 +106,73 @@ def test_of_two_robots_that_begin_at_once_on_one_map_each_reads_the_other_s_plac
     assert here(first) == here(second) == ["dock", "sink"]
 
 
+def test_a_robot_that_wrote_nothing_yet_is_told_nothing_of_another_map_as_here(
+    store: SemanticMapStore,
+) -> None:
+    first, second = opened(store, MAP), opened(store, MOVED)
+
+    first.write(DOCK)
+    first.write_event(WET)
+
+    assert second.read_events() == ()
+    assert (here(second), elsewhere(second)) == ([], ["dock"])
+
+
+def test_of_two_robots_with_hardly_a_wall_each_has_its_own_frame(store: SemanticMapStore) -> None:
+    first, second = (opened(store, BLANK, map_id=map_id) for map_id in ("house", "annex"))
+
+    first.write(DOCK)
+    second.write(SINK)
+
+    assert (here(first), elsewhere(first)) == (["dock"], ["sink"])
+    assert (here(second), elsewhere(second)) == (["sink"], ["dock"])
+
+
+def test_walls_of_which_another_robot_has_kept_more_stay(store: SemanticMapStore) -> None:
+    part, more = (MAP.crop(slice(0, MAP.n_rows), slice(0, n_cols)) for n_cols in (120, 150))
+    first = opened(store, part)
+    first.write(DOCK)
+    opened(store, MAP).write(SINK)
+
+    first.meet(more)
+    first.write(DOCK)
+
+    assert (snapshot(store).cells == MAP.cells).all()
+
+
+class Overtaken:
+    """`KeptWalls` where another robot keeps its own under a free name as soon as it is told."""
+
+    def __init__(self, walls: KeptWalls, others: OccupancyGrid) -> None:
+        self._walls = walls
+        self._others = others
+
+    def load(self, name: str) -> OccupancyGrid | None:
+        return self._walls.load(name)
+
+    def keep(self, grid: OccupancyGrid, name: str, *, is_first: bool = False) -> bool:
+        return self._walls.keep(grid, name, is_first=is_first)
+
+    def free_name(self) -> str:
+        name = self._walls.free_name()
+        if name == "map-2.yaml":
+            self._walls.keep(self._others, name)
+        return name
+
+
+@pytest.mark.usefixtures("memory")
+def test_walls_of_a_new_frame_take_the_place_of_no_other_robot_s(store: SemanticMapStore) -> None:
+    overtaken = SemanticMapStore(store.path, map_id="annex")
+    overtaken.walls = Overtaken(store.walls, MOVED)
+    memory = FramedMemory(overtaken)
+    memory.meet(OTHER)
+
+    memory.write(replace(DOCK, name="oven"))
+
+    assert (snapshot(store, "map-2.yaml").cells == MOVED.cells).all()
+    assert here(opened(store, OTHER)) == ["oven"]
+
+
 def test_free_cells_that_are_probabilities_are_kept_as_free(store: SemanticMapStore) -> None:
     cells = np.where(MAP.free, 45, np.where(MAP.occupied, 60, -1)).astype(np.int8)
 
@@ -128,7 +200,10 @@ def test_a_map_that_has_grown_is_kept_in_place_of_the_old_one(store: SemanticMap
 
     assert here(memory) == ["dock", "sink"]
     assert (snapshot(store).cells == MAP.cells).all()
-    assert len(list(store.path.with_name("places.memory").glob("*.pgm"))) == 1
+    memory.meet(MAP_AND_YARD)
+    memory.write(SINK)
+    # The picture before stays for those who read it now.
+    assert len(list(store.path.with_name("places.memory").glob("*.pgm"))) == 2
 
 
 def test_a_map_that_has_hardly_grown_is_not_written_again(
@@ -145,8 +220,7 @@ def test_a_map_that_has_hardly_grown_is_not_written_again(
 
 
 def test_a_map_with_hardly_a_wall_is_not_kept(store: SemanticMapStore) -> None:
-    blank = OccupancyGrid(cells=MAP.cells[5:20, 5:20], resolution_m=0.1)
-    memory = opened(store, blank)
+    memory = opened(store, BLANK)
     memory.write(DOCK)
 
     assert not store.path.with_name("places.memory").exists()

@@ -4,7 +4,7 @@ Only this module holds back records of other maps: readers get no waypoint, even
 not aligned with the robot's map.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 
@@ -51,13 +51,13 @@ class FramedMemory(MemoryStore):
 
         Before there is a map, all places are returned unmoved: no drive can use them yet.
         """
-        memory, here = (
-            self.store.read(),
-            (self.keeper.has_met, self.keeper.is_placed, self.keeper.frame),
-        )
+        memory = self.store.read()
+        self.keeper.review(memory)
+        here = (self.keeper.has_met, self.keeper.is_placed, self.keeper.frame)
         if self._read is None or self._read[0] is not memory or self._read[1] != here:
             self._read = (memory, here, self._place_all(memory.present()))
-        n_elsewhere = len(self.store.read_events()) - len(self.read_events())
+        events = self.store.read_events()
+        n_elsewhere = len(events) - len(self._place_events(events, memory.frames))
         return replace(self._read[2], n_events_elsewhere=n_elsewhere)
 
     def _place_all(self, memory: SemanticMap) -> SemanticMap:
@@ -78,10 +78,13 @@ class FramedMemory(MemoryStore):
         Events that people wrote without metres, in a file of no known map, apply everywhere:
         driving a closed way is worse than avoiding an open one.
         """
-        events = self.store.read_events()
+        memory = self.store.read()
+        self.keeper.review(memory)
+        return self._place_events(self.store.read_events(), memory.frames)
+
+    def _place_events(self, events: Iterable[Event], frames: Frames) -> tuple[Event, ...]:
         if not self.keeper.has_met:
-            return events
-        frames = self.store.read().frames
+            return tuple(events)
         return tuple(filter(None, (self._place_event(each, frames) for each in events)))
 
     def _place_event(self, event: Event, frames: Frames) -> Event | None:

@@ -72,6 +72,8 @@ class FrameKeeper:
         self._lock = lock or nullcontext()
         self._grid: OccupancyGrid | None = None
         self._is_assumed = False
+        # True once this robot may have written on a map whose frame is assumed.
+        self._has_begun = False
         self._fault: SemanticMapError | None = None
         self.frame: FrameId = None
         self.is_placed = False
@@ -92,9 +94,19 @@ class FrameKeeper:
             before, self._grid = self._grid, grid
             if before is not None and not _goes_on(before, grid):
                 self.n_maps += 1
-                self.is_placed = False
+                self.is_placed = self._has_begun = False
             if not self.is_placed:
                 self._place(self._store.read())
+
+    def review(self, memory: SemanticMap) -> None:
+        """Place the robot's map anew where its frame is only assumed: another may have come first.
+
+        Raises:
+            SemanticMapError: A kept map cannot be read.
+        """
+        if self._is_assumed:
+            with self._lock:
+                self._place(memory)
 
     def has_walls(self, frame_id: FrameId) -> bool:
         """Return True if something distinguishes a frame from others."""
@@ -111,10 +123,7 @@ class FrameKeeper:
             SemanticMapError: A new frame cannot be written.
         """
         with self._lock:
-            if self._is_assumed and self.has_walls(self.frame):
-                # Another robot came first: its map counts.
-                self.is_placed = False
-            if not self.is_placed:
+            if self._is_assumed or not self.is_placed:
                 self._place(self._store.read())
             if not self.is_placed:
                 self._begin_frame()
@@ -125,18 +134,24 @@ class FrameKeeper:
                     # The record counts for more than the walls; `compare` tells of it.
                     self._fault = fault
                 else:
-                    return self.frame if is_kept else self.place()
+                    if not is_kept:
+                        return self.place()
+            self._has_begun = self._is_assumed
             return self.frame
 
     def _keep(self, grid: OccupancyGrid) -> bool:
         """Keep the walls if none are kept or they have grown; False if another robot was first."""
         name = self._walls_of(self.frame)
         kept = None if name is None else self._load(name)
-        if kept is None:
+        if name is None or kept is None:
             return self._keep_walls(grid, name)
-        if name is not None and self._has_grown(name, kept, grid):
-            self._store.walls.keep(grid, name)
-            self._loaded[name] = grid
+        if self._has_grown(name, kept, grid):
+            # Another robot may have kept more of them meanwhile.
+            del self._loaded[name]
+            latest = self._load(name)
+            if latest is None or self._has_grown(name, latest, grid):
+                self._store.walls.keep(grid, name)
+                self._loaded[name] = grid
         return True
 
     def compare(self) -> MapComparison | None:
@@ -170,6 +185,7 @@ class FrameKeeper:
             if grid is None:
                 raise SemanticMapError("The robot has no map yet.", hint="Wait for one.")
             self._compared.clear()
+            self._loaded.clear()
             strange = list(self._find_strange(self._store.read()))
             if not strange:
                 return self._tell_all_known(grid)
@@ -182,19 +198,19 @@ class FrameKeeper:
     def _place(self, memory: SemanticMap) -> None:
         """Find the frame whose kept walls match the robot's map unmoved."""
         grid = self._grid
-        for frame_id, name, kept in self._find_kept(memory):
-            if grid is None:
-                continue
+        for frame_id, name, kept in self._find_kept(memory) if grid is not None else ():
             if self._compare(name, kept, grid).relation is MapRelation.SAME:
                 self.frame, self.is_placed, self._is_assumed = frame_id, True, False
                 return
-        if self._is_own_by_name(memory):
-            self.frame, self.is_placed, self._is_assumed = None, True, True
+        is_own = self._is_own_by_name(memory)
+        self.frame, self.is_placed, self._is_assumed = None, is_own, is_own
 
     def _is_own_by_name(self, memory: SemanticMap) -> bool:
         """Return True where the memory's own frame has no walls, and nothing speaks against it."""
-        if memory.frames.items or self.has_walls(None):
+        if self.has_walls(None):
             return False
+        if self._has_begun or memory.frames.items:
+            return self._has_begun
         is_empty = not memory.waypoints and not self._store.read_events()
         names = (memory.map_id, self._store.map_id)
         is_named = memory.map_id is not None and (None in names or names[0] == names[1])
@@ -204,8 +220,7 @@ class FrameKeeper:
         grid = self._grid
         walls = None
         if grid is not None and _is_worth_keeping(grid):
-            walls = self._store.walls.free_name()
-            self._store.walls.keep(grid, walls)
+            walls = self._keep_new(grid)
         frames = self._store.write_frames(
             lambda known: known.added(
                 MapFrame(
@@ -288,15 +303,22 @@ class FrameKeeper:
 
     def _keep_walls(self, grid: OccupancyGrid, name: str | None) -> bool:
         """Keep walls for the first time; False if another robot was first."""
-        kept_as = name or self._store.walls.free_name()
-        if not self._store.walls.keep(grid, kept_as, is_first=True):
+        if name is not None and not self._store.walls.keep(grid, name, is_first=True):
             return False
+        kept_as = name or self._keep_new(grid)
         self._loaded[kept_as] = grid
         self._is_assumed = False
         if name is None and self.frame is not None:
             frame_id = self.frame
             self._store.write_frames(lambda known: known.changed(frame_id, walls=kept_as))
         return True
+
+    def _keep_new(self, grid: OccupancyGrid) -> str:
+        """Keep walls under a name that no other robot has taken meanwhile; return it."""
+        name = self._store.walls.free_name()
+        while not self._store.walls.keep(grid, name, is_first=True):
+            name = self._store.walls.free_name()
+        return name
 
     def _has_grown(self, name: str, kept: OccupancyGrid, grid: OccupancyGrid) -> bool:
         """Return True where the robot's map shows more than the kept one, and nothing else."""
