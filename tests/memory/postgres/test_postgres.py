@@ -13,6 +13,8 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Waypoint
+from mapspeak.memory.alignment.framed import FramedMemory
+from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.postgres import MIGRATIONS, PostgresStore
 from postgres_server import PostgresServer, run_postgres
 from served import connect, report_of
@@ -94,18 +96,22 @@ async def test_what_one_robot_of_a_fleet_notes_the_others_find_at_once(
 def test_nothing_acknowledged_is_lost_when_the_database_falls(
     postgres: PostgresServer, store: PostgresStore
 ) -> None:
+    memory = FramedMemory(store)
+    memory.meet(two_rooms())
     store.write(place("dock"))
+    store.write_event(Event(text="wet", place="C1", effect=Effect.CLOSED))
     store.read()
 
     postgres.stop()
     try:
-        meanwhile = store.read()
+        meanwhile, events = memory.read(), memory.read_events()
         with pytest.raises(SemanticMapError, match="cannot be used"):
             store.write(place("hall"))
     finally:
         postgres.start()
 
     assert [each.name for each in meanwhile.waypoints] == ["dock"]
+    assert [each.text for each in events] == ["wet"]
     assert "the waypoints read before are given" in meanwhile.warnings[0]
     assert names(store) == ["dock"]
     assert store.read().warnings == ()
@@ -145,6 +151,16 @@ def test_a_database_of_a_newer_mapspeak_is_left_alone(address: str, store: Postg
     store.close()
 
     with pytest.raises(SemanticMapError, match="newer mapspeak"):
+        store.write(place("hall"))
+
+
+def test_a_database_that_was_half_made_is_told(address: str, store: PostgresStore) -> None:
+    store.write(place("dock"))
+    with psycopg.connect(address, autocommit=True) as other:
+        other.execute("DELETE FROM mapspeak.schema")
+    store.close()
+
+    with pytest.raises(SemanticMapError, match="half made"):
         store.write(place("hall"))
 
 

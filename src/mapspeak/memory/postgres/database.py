@@ -129,10 +129,15 @@ def _migrate(connection: psycopg.Connection[Any]) -> None:
         connection.execute("SELECT pg_advisory_xact_lock(%s)", (_MIGRATION_LOCK,))
         rows = connection.execute("SELECT to_regclass('mapspeak.schema') IS NOT NULL")
         (is_there,) = cast("tuple[bool]", rows.fetchone())
-        version = 0
+        version: int | None = 0
         if is_there:
             rows = connection.execute("SELECT version FROM mapspeak.schema")
-            (version,) = cast("tuple[int]", rows.fetchone())
+            (version,) = cast("tuple[int] | None", rows.fetchone()) or (None,)
+        if version is None:
+            raise SemanticMapError(
+                "The schema of this database is half made: mapspeak.schema has no version.",
+                hint="Restore it from a copy, or drop the schema mapspeak to begin anew.",
+            )
         if version > len(MIGRATIONS):
             raise SemanticMapError(
                 f"A newer mapspeak made this database: its schema is {version}, and the last "

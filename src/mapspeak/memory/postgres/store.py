@@ -108,18 +108,15 @@ class PostgresStore(MemoryStore):
 
         While the database cannot be reached, the places read before are given, with a warning.
         """
-        try:
-            return self._look().places
-        except SemanticMapError as fault:
-            if self._known is None:
-                raise
-            places = self._known.places
-            warning = f"{fault} Until then, the waypoints read before are given."
-            return replace(places, warnings=(*places.warnings, warning))
+        known, fault = self._look()
+        if fault is None:
+            return known.places
+        warning = f"{fault} Until then, the waypoints read before are given."
+        return replace(known.places, warnings=(*known.places.warnings, warning))
 
     def read_events(self) -> tuple[Event, ...]:
-        """Return all events, also those that are over."""
-        return tuple(self._look().of(_EVENT).values())
+        """Return all events, also those that are over; meanwhile those read before."""
+        return tuple(self._look()[0].of(_EVENT).values())
 
     def close(self) -> None:
         """End the connection; the next call makes another."""
@@ -147,10 +144,15 @@ class PostgresStore(MemoryStore):
         self._is_bound = rows.map_id is not None
         return result
 
-    def _look(self) -> _Known:
-        """Return the present content of the database."""
-        with self._database.connected() as connection:
-            return self._read_news(connection)
+    def _look(self) -> tuple[_Known, SemanticMapError | None]:
+        """Return the present content of the database; while it is away that of before, and why."""
+        try:
+            with self._database.connected() as connection:
+                return self._read_news(connection), None
+        except SemanticMapError as fault:
+            if self._known is None:
+                raise
+            return self._known, fault
 
     def _read_news(self, connection: psycopg.Connection[Any]) -> _Known:
         """Return the known content updated by every changed row."""
