@@ -1,7 +1,7 @@
 """Recognise by kept walls which of a memory's frames the robot's map is in."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 
 from mapspeak.errors import SemanticMapError
@@ -101,11 +101,10 @@ class FrameKeeper:
     def review(self, memory: SemanticMap) -> None:
         """Place the robot's map anew where its frame is only assumed: another may have come first.
 
-        Raises:
-            SemanticMapError: A kept map cannot be read.
+        While the kept maps cannot be read the assumption stands; a write tells of it.
         """
         if self._is_assumed:
-            with self._lock:
+            with self._lock, suppress(SemanticMapError):
                 self._place(memory)
 
     def has_walls(self, frame_id: FrameId) -> bool:
