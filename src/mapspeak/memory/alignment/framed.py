@@ -90,9 +90,9 @@ class FramedMemory(MemoryStore):
     def _place_event(self, event: Event, frames: Frames) -> Event | None:
         keeper = self.keeper
         placed = frames.bring(event, keeper.frame) if keeper.is_placed else None
-        has_metres = event.at is not None or bool(event.outlines)
-        is_of_no_map = event.frame is None and not keeper.has_walls(None)
-        return event if placed is None and is_of_no_map and not has_metres else placed
+        if placed is not None or event.frame is not None or event.at or event.outlines:
+            return placed
+        return None if keeper.has_walls(None) else event
 
     def name_map(self) -> str | None:
         """Return the name of the robot's map in observations; begin a frame if needed.
