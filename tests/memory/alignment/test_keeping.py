@@ -344,6 +344,16 @@ def test_what_is_aligned_stays_so_for_every_robot_and_every_map(store: SemanticM
         assert "Nothing had to be aligned." in say_receipt(again)
 
 
+def test_realigning_counts_the_places_of_all_frames(store: SemanticMapStore) -> None:
+    opened(store, MAP).write(DOCK)
+    opened(store, MOVED).write(SINK)
+    memory = opened(store, MOVED_TWICE)
+
+    receipt = memory.keeper.realign()
+
+    assert receipt.n_waypoints == len(here(memory)) == 2
+
+
 def test_a_known_place_is_written_in_its_own_frame(
     memory: FramedMemory, store: SemanticMapStore
 ) -> None:

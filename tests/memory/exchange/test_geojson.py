@@ -1,6 +1,7 @@
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, name_key
+from mapspeak.memory.frames import Frames, MapFrame
 from mapspeak.memory.exchange.geojson import from_geojson, to_geojson
 from mapspeak.memory.store.records import data_of
 from mapspeak.spatial.areagraph import MapAnchor
@@ -53,6 +55,18 @@ def test_places_come_back_from_where_they_are_on_earth() -> None:
     text = to_geojson(PLACES, anchor=ANCHOR)
     assert "7.8" in text
     assert said(from_geojson(text)) == said(PLACES)
+
+
+def test_places_of_other_frames_are_where_their_alignment_puts_them_or_left_out_on_earth() -> None:
+    aligned = MapFrame(id="F2", pose=Pose(5.0, 0.0))
+    yard, roof = (replace(DOCK, name=name, frame=of) for name, of in (("yard", "F2"), ("roof", "F3")))
+    places = SemanticMap(waypoints=(yard, roof), frames=Frames((aligned, MapFrame(id="F3"))))
+
+    flat, on_earth = (from_geojson(to_geojson(places, anchor=each)) for each in (None, ANCHOR))
+
+    told = [(each.name, each.frame, each.pose.x) for each in flat.waypoints]
+    assert told == [("yard", None, 6.2), ("roof", "F3", 1.2)]
+    assert [(each.name, round(each.pose.x, 2)) for each in on_earth.waypoints] == [("yard", 6.2)]
 
 
 def test_geojson_says_its_frame_and_has_numbers_as_numbers() -> None:

@@ -256,6 +256,7 @@ def test_a_faulty_line_is_reported_with_its_place_and_an_example(
         ("safety_landmarks: [[a]]", "safety_landmarks.0 is not a mapping"),
         ("geometric_features: [{label: x}]", "geometric_features.0 is not text"),
         ("recorded_at: 2026-11-02 10:30", "is not a date and time with a time zone"),
+        ("recorded_at: 9999-12-31T23:59:59+00:00", "before the year 9999"),
         ("stamp_s: now", 'stamp_s, "now", is not a number'),
         ("room_id: [R1]", "room_id is not text"),
         ("picture: {}", "picture is not text"),

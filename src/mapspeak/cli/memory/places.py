@@ -38,9 +38,13 @@ def export(out: Path | None, anchor: MapAnchor | None, semantic_map: str | None)
     if out is not None and out.suffix.lower() not in (".geojson", ".json"):
         raise ConfigError(f"--out {out} is no GeoJSON file.", hint="End its name in .geojson.")
     places = read_places(open_memory(semantic_map))
+    is_known = [places.frames.bring(each, None) is not None for each in places.waypoints]
+    n_left = 0 if anchor is None else is_known.count(False)
     write_out(to_geojson(places, anchor=anchor), out)
+    if n_left:
+        click.echo(f"{n_left} places of other maps are left out: nothing tells where.", err=True)
     if out is not None:
-        click.echo(f"{len(places.waypoints)} places written to {out}.")
+        click.echo(f"{len(places.waypoints) - n_left} places written to {out}.")
 
 
 @click.command("import")

@@ -132,7 +132,9 @@ class FramedMemory(MemoryStore):
     def write_event(self, event: Event) -> Event:
         """Write an event that is in the frame of the robot's map."""
         written = self.store.write_event(replace(event, frame=self.keeper.place()))
-        return next(each for each in self.read_events() if each.id == written.id)
+        placed = self.store.read().frames.bring(written, self.keeper.frame)
+        assert placed is not None  # noqa: S101 - it was just written in this frame or one aligned
+        return placed
 
     def join(
         self, waypoint: Waypoint, join: Callable[[Waypoint | None, Waypoint], Waypoint]

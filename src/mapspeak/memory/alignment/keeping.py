@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
@@ -34,8 +34,8 @@ class RealignReceipt:
     """Result of aligning records whose map may have moved.
 
     Attributes:
-        motion: From the old frame to the robot's; None if nothing was aligned.
-        n_waypoints: Waypoints whose frame became known.
+        motion: From the first old frame to the robot's; None if nothing was aligned.
+        n_waypoints: Waypoints whose frame became known, of all frames.
     """
 
     comparison: MapComparison
@@ -189,8 +189,12 @@ class FrameKeeper:
             if not strange:
                 return self._tell_all_known(grid)
             receipts = [self._align(frame_id, name, kept) for frame_id, name, kept in strange]
-            aligned = [each for each in receipts if each.motion is not None]
-            return (aligned or receipts)[0]
+            first = next((each for each in receipts if each.motion is not None), receipts[0])
+            return replace(
+                first,
+                n_waypoints=sum(each.n_waypoints for each in receipts),
+                n_events=sum(each.n_events for each in receipts),
+            )
 
     # --- where the robot's map is ------------------------------------------------------------
 

@@ -71,7 +71,10 @@ def place_of(waypoint: Waypoint) -> Point:
 
 
 def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
-    """Return the memory as GeoJSON.
+    """Return the memory as GeoJSON, in its own frame as far as other frames are aligned with it.
+
+    Places of a frame of unknown alignment keep its id and its metres; nothing tells where on earth
+    they are, so that with an anchor they are left out.
 
     Raises:
         MapError: A place is too far from the anchor.
@@ -85,7 +88,9 @@ def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
             "coordinates": "longitude and latitude of WGS 84, in degrees",
             "anchor": on_earth,
         }
-    features = [_feature(place, anchor) for place in places.waypoints]
+    placed = (places.frames.bring(place, None) or place for place in places.waypoints)
+    told = (place for place in placed if anchor is None or place.frame is None)
+    features = [_feature(place, anchor) for place in told]
     collection = {"type": "FeatureCollection", "mapspeak": member, "features": features}
     return json.dumps(collection, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 

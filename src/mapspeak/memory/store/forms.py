@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import MAXYEAR, MINYEAR, datetime
 from enum import StrEnum
 from typing import Any
 
@@ -73,8 +73,9 @@ def _read_time(value: Data) -> datetime:
         time = datetime.fromisoformat(value) if isinstance(value, str) else None
     except ValueError:
         time = None
-    if time is None or time.tzinfo is None:
-        raise ValueError("is not a date and time with a time zone")
+    # Of other years some zones have no time.
+    if time is None or time.tzinfo is None or not MINYEAR < time.year < MAXYEAR:
+        raise ValueError("is not a date and time with a time zone, before the year 9999")
     return time
 
 
