@@ -25,7 +25,7 @@ MAP, MOVED, OTHER = fine(HOUSE), moved(fine(HOUSE), MOTION), fine(OTHER_HOUSE)
 MAP_AND_YARD = OccupancyGrid(
     cells=np.pad(MAP.cells, ((0, 0), (0, 60))), resolution_m=MAP.resolution_m, origin=MAP.origin
 )
-BLANK = OccupancyGrid(cells=MAP.cells[5:20, 5:20], resolution_m=0.1)
+BLANK = MAP.crop(slice(5, 20), slice(5, 20))
 MOVED_TWICE = moved(fine(HOUSE), TWICE)
 DOCK = Waypoint(
     name="dock",
@@ -342,6 +342,20 @@ def test_what_is_aligned_stays_so_for_every_robot_and_every_map(store: SemanticM
         again = memory.keeper.realign()
         assert again.motion is None
         assert "Nothing had to be aligned." in say_receipt(again)
+
+
+def test_a_map_that_was_too_small_to_be_recognised_is_aligned_once_it_shows_enough(
+    memory: FramedMemory, store: SemanticMapStore
+) -> None:
+    late = opened(store, BLANK)
+    late.write(replace(DOCK, name="early"))
+    assert (here(late), elsewhere(late)) == (["early"], ["dock", "sink"])
+    late.meet(MAP)
+
+    receipt = late.keeper.realign()
+
+    assert "2 waypoints and 0 events more can be used here" in say_receipt(receipt)
+    assert sorted(here(late)) == sorted(here(memory)) == ["dock", "early", "sink"]
 
 
 def test_realigning_counts_the_places_of_all_frames(store: SemanticMapStore) -> None:

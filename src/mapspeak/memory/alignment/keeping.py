@@ -243,19 +243,21 @@ class FrameKeeper:
         assert grid is not None  # noqa: S101 - asked for after it was met
         comparison = self._compare(name, kept, grid)
         fit = comparison.fit
-        if comparison.relation is not MapRelation.MOVED or fit is None:
+        if comparison.relation not in (MapRelation.SAME, MapRelation.MOVED):
             return RealignReceipt(comparison=comparison)
+        # The same map has a frame of its own where it was too small at first to be recognised.
+        motion = NO_MOTION if fit is None else fit.new_from_old
         here, n_before = self.place(), self._count_known()
         memory = self._store.read()
         if memory.frames.find_transform(of=frame_id, into=here) is None:
             self._store.write_frames(
-                lambda known: known.aligned(frame_id, here, motion=fit.new_from_old)
+                lambda known: known.aligned(frame_id, here, motion=motion)
             )
         n_after = self._count_known()
         return RealignReceipt(
             comparison=comparison,
-            motion=fit.new_from_old,
-            certainty=fit.certainty,
+            motion=motion,
+            certainty=Certainty.SURE if fit is None else fit.certainty,
             n_waypoints=n_after[0] - n_before[0],
             n_events=n_after[1] - n_before[1],
         )

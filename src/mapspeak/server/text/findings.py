@@ -143,14 +143,16 @@ async def say_moved(comparing: Awaitable[MapComparison | None]) -> str:
         comparison = await comparing
     except SemanticMapError as error:
         return str(error)
-    if comparison is None or comparison.relation is MapRelation.SAME:
+    if comparison is None:
         return ""
     todo = lead(AFTER_MOVE.get(comparison.relation, UNSURE))
     return f"{say_comparison(comparison)} {todo}"
 
 
+_ALIGN = "Places remembered on another map are left out. {realign_memory} aligns it."
 AFTER_MOVE = {
-    MapRelation.MOVED: "Places remembered on another map are left out. {realign_memory} aligns it.",
+    MapRelation.SAME: _ALIGN,
+    MapRelation.MOVED: _ALIGN,
     MapRelation.OTHER: "Places remembered on another map are left out: they mean nothing here.",
 }
 UNSURE = (
