@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
-from weakref import WeakKeyDictionary
 
 from mapspeak.errors import ConfigError
 from mapspeak.memory import SemanticMap, Waypoint
@@ -50,7 +49,7 @@ class Search:
         self._find_vectors = find_vectors
         self._lock = threading.Lock()
         self._index: EntryIndex | None = None
-        self._entries: WeakKeyDictionary[Remembered, Entry] = WeakKeyDictionary()
+        self._entries: dict[Remembered, Entry] = {}
 
     @contextmanager
     def holding(self, entries: Sequence[Entry]) -> Iterator[EntryIndex]:
@@ -64,10 +63,11 @@ class Search:
     def list_entries(self, recollection: "Recollection") -> tuple[Entry, ...]:
         """Return what is said of places and things; what is known of the same ones stays."""
         known = self._entries
-        return tuple(
-            known.get(each) or known.setdefault(each, recollection.describe(each))
-            for each in recollection.everything
-        )
+        entries = {
+            each: known.get(each) or recollection.describe(each) for each in recollection.everything
+        }
+        self._entries = entries
+        return tuple(entries.values())
 
 
 class Recollection:
