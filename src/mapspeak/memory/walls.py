@@ -16,7 +16,6 @@ from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map
 
-
 LOCK_TIMEOUT_S = 5.0
 
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, name_key
-from mapspeak.memory.frames import Frames, MapFrame
 from mapspeak.memory.exchange.geojson import from_geojson, to_geojson
+from mapspeak.memory.frames import Frames, MapFrame
 from mapspeak.memory.store.records import data_of
 from mapspeak.spatial.areagraph import MapAnchor
 from waypoints import waypoints
@@ -59,7 +59,9 @@ def test_places_come_back_from_where_they_are_on_earth() -> None:
 
 def test_places_of_other_frames_are_where_their_alignment_puts_them_or_left_out_on_earth() -> None:
     aligned = MapFrame(id="F2", pose=Pose(5.0, 0.0))
-    yard, roof = (replace(DOCK, name=name, frame=of) for name, of in (("yard", "F2"), ("roof", "F3")))
+    yard, roof = (
+        replace(DOCK, name=name, frame=of) for name, of in (("yard", "F2"), ("roof", "F3"))
+    )
     places = SemanticMap(waypoints=(yard, roof), frames=Frames((aligned, MapFrame(id="F3"))))
 
     flat, on_earth = (from_geojson(to_geojson(places, anchor=each)) for each in (None, ANCHOR))

@@ -104,7 +104,9 @@ def test_a_memory_joined_with_a_copy_of_itself_on_the_same_map_stays_the_same(
     assert sorted(each.name for each in opened(out, MAP).read().waypoints) == ["dock", "sink"]
 
 
-def test_frames_of_a_second_memory_are_those_of_the_first_with_their_walls(first: Path, tmp_path: Path) -> None:
+def test_frames_of_a_second_memory_are_those_of_the_first_with_their_walls(
+    first: Path, tmp_path: Path
+) -> None:
     opened(first, OTHER).write(Waypoint(name="oven", pose=SINK))
     second = made(tmp_path / "b.yaml", OTHER, {"hob": SINK})
     opened(second, MAP).write(Waypoint(name="tap", pose=SINK))
@@ -129,7 +131,10 @@ def test_a_memory_with_frames_joined_with_a_copy_of_itself_stays_the_same(
     merge_files(first, copy, out=tmp_path / "c.yaml")
 
     united = SemanticMapStore(tmp_path / "c.yaml").read()
-    assert [(each.name, each.frame) for each in united.waypoints] == [("dock", None), ("oven", "F2")]
+    assert [(each.name, each.frame) for each in united.waypoints] == [
+        ("dock", None),
+        ("oven", "F2"),
+    ]
 
 
 def test_walls_tell_more_of_a_second_memory_than_the_name_of_its_map(tmp_path: Path) -> None:

@@ -201,8 +201,8 @@ class FrameKeeper:
     def _place(self, memory: SemanticMap) -> None:
         """Find the frame whose kept walls match the robot's map unmoved."""
         grid = self._grid
-        for frame_id, name, kept in self._find_kept(memory) if grid is not None else ():
-            if self._compare(name, kept, grid).relation is MapRelation.SAME:
+        for frame_id, name, kept in self._find_kept(memory):
+            if grid is not None and self._compare(name, kept, grid).relation is MapRelation.SAME:
                 self.frame, self.is_placed, self._is_assumed = frame_id, True, False
                 return
         is_own = self._is_own_by_name(memory)
@@ -250,9 +250,7 @@ class FrameKeeper:
         here, n_before = self.place(), self._count_known()
         memory = self._store.read()
         if memory.frames.find_transform(of=frame_id, into=here) is None:
-            self._store.write_frames(
-                lambda known: known.aligned(frame_id, here, motion=motion)
-            )
+            self._store.write_frames(lambda known: known.aligned(frame_id, here, motion=motion))
         n_after = self._count_known()
         return RealignReceipt(
             comparison=comparison,

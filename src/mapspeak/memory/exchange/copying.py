@@ -29,8 +29,12 @@ def copy_memory(source: MemoryStore, target: MemoryStore) -> Copied:
     def fill(records: Records) -> None:
         _require_empty(records)
         records.bind(places.map_id)
-        for record in (*places.frames.items, *places.waypoints, *events):
-            records.put(record)
+        for frame in places.frames.items:
+            records.put(frame)
+        for place in places.waypoints:
+            records.put(place)
+        for event in events:
+            records.put(event)
 
     target.change(_require_empty, alone=True)
     # The walls first: records without them are of no map.

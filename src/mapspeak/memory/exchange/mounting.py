@@ -34,8 +34,7 @@ class Mount:
     def rename_places(self, places: SemanticMap) -> SemanticMap:
         """Return the second memory's places with their frames renamed."""
         waypoints = (
-            replace(each, frame=self.ids[each.frame], map_id=None)
-            for each in places.waypoints
+            replace(each, frame=self.ids[each.frame], map_id=None) for each in places.waypoints
         )
         return replace(places, waypoints=tuple(waypoints), map_id=None)
 
@@ -103,7 +102,8 @@ def _list_frames(store: MemoryStore) -> tuple[MapFrame, ...]:
     named = (
         *entries,
         *(frame.reference for frame in memory.frames.items),
-        *(record.frame for record in (*memory.waypoints, *store.read_events())),
+        *(place.frame for place in memory.waypoints),
+        *(event.frame for event in store.read_events()),
     )
     others = dict.fromkeys(filter(None, named))
     own = MapFrame(id="", map_id=memory.map_id)
