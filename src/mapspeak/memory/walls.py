@@ -11,7 +11,7 @@ import numpy as np
 from filelock import FileLock
 
 from mapspeak.errors import MapError, SemanticMapError
-from mapspeak.memory.store.durable import sync_folder
+from mapspeak.memory.durable import sync_folder
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map

@@ -13,7 +13,7 @@ from filelock import FileLock
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
-from mapspeak.memory.store.durable import MAX_BYTES, DurableFile
+from mapspeak.memory.durable import MAX_BYTES, DurableFile
 
 IS_ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.store.durable import sync_folder
+from mapspeak.memory.durable import sync_folder
 
 SCHEMA_VERSION = 1
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory.store.durable import sync_folder, write_synced
+from mapspeak.memory.durable import sync_folder, write_synced
 
 _SUFFIXES = {b"\xff\xd8\xff": "jpg", b"\x89PNG\r\n\x1a\n": "png"}
 _OURS = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{12}\.(?:jpg|png)(?:\.tmp)?")

@@ -7,11 +7,11 @@ from itertools import count
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.memory.durable import sync_folder
 from mapspeak.memory.episodes.store import BroughtOver, bring_over
 from mapspeak.memory.exchange.mounting import mount
 from mapspeak.memory.merging import merge_waypoint
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store.durable import sync_folder
 from mapspeak.memory.store.memorystore import MemoryStore
 from mapspeak.memory.store.records import data_of
 from mapspeak.memory.store.semanticmap import SemanticMapStore

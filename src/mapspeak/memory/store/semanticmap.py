@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import cast
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.memory.durable import DurableFile, Fingerprint
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames
 from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.durable import DurableFile, Fingerprint
 from mapspeak.memory.store.memorystore import MemoryStore, OneRecord, Records, Result
 from mapspeak.memory.store.records import key_of, list_key_of
 from mapspeak.memory.walls import WallFolder
