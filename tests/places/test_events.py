@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from closing import EAST, LATER, NOW, WEST, event, goes_north, revision_with, world_on
+from drawing import grid_from_text
 from mapspeak.errors import GoalError, SemanticMapError
-from mapspeak.memory import SemanticMapStore
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap, SemanticMapStore
 from mapspeak.memory.events import Effect
 from mapspeak.places.recall.events import (
     close_floor_of,
@@ -21,6 +23,8 @@ from mapspeak.places.recall.events import (
     say_unplaced,
 )
 from mapspeak.worldmodel.keepout import MARGIN_M, POST_M, SILL_M
+from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.revision import MapRevision
 
 
 @pytest.fixture
@@ -206,3 +210,35 @@ def test_an_event_at_a_point_tells_how_much_floor_it_takes(store: SemanticMapSto
 
     assert '"a spill" (0.5 m around 12.00, 6.50)' in noted.sentence(NOW)
     assert '"a note" (12.00, 6.50)' in mere.sentence(NOW)
+
+
+ROUND_A_ROOM = """
+######################
+#....................#
+#....................#
+#..################..#
+#..#..............#..#
+#..#..............#..#
+#.................#..#
+#.................#..#
+#..#..............#..#
+#..################..#
+#....................#
+#....................#
+######################
+"""
+
+
+def test_a_corridor_that_is_closed_closes_no_room_inside_it(store: SemanticMapStore) -> None:
+    grid = grid_from_text(ROUND_A_ROOM, resolution_m=0.5)
+    inside = Point(5.0, 3.2)
+    revision = MapRevision(grid, radius_m=0.2)
+    world = WorldModel(
+        grid, Pose(inside.x, inside.y), SemanticMap(), radius_m=0.2, revision=revision
+    )
+    corridor = revision.rooms.find_region_at(Point(5.0, 0.8))
+    assert corridor is not None
+    note_event(world, store, text="wet", effect=Effect.CLOSED, place=corridor.id, now=NOW)
+    (area,) = close_floor_of(store.read_events(), revision, NOW)
+    assert area.contains(Point(5.0, 0.8))
+    assert not area.contains(inside)

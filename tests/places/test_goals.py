@@ -219,3 +219,25 @@ def test_a_number_with_hundreds_of_digits_is_not_repeated() -> None:
         check = check_goal(grid, distances, Pose(far, 0.0))
         assert check.verdict is GoalVerdict.NOT_FINITE
         assert len(say_check(check)) < 100
+
+
+def test_the_nearest_obstacle_is_told_only_as_far_as_all_are_looked_at() -> None:
+    cells = np.zeros((400, 400), dtype=np.int8)
+    # In the corner of what is looked at, and nearer beyond its side.
+    cells[275, 275] = cells[200, 285] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.1)
+    robot = Point(20.0, 20.0)
+    found = check_goal(grid, distances_from(grid, robot, radius_m=0.2), Pose(20.05, 20.05))
+    assert math.isinf(found.clearance_m)
+    assert "more than 8 m from any obstacle" in say_check(found)
+
+
+def test_beside_a_turned_map_no_span_is_told_that_holds_the_goal() -> None:
+    grid = grid_from_text(
+        "......\n......\n......", resolution_m=1.0, origin=Pose(0, 0, math.pi / 4)
+    )
+    distances = distances_from(grid, Point(0.0, 1.0), radius_m=0.2)
+    beside = check_goal(grid, distances, Pose(-2.0, 0.1))
+    assert beside.verdict is GoalVerdict.OFF_MAP
+    assert say_check(beside) == "(-2.00, 0.10) lies off the map."
+    assert "spans x" in say_check(check_goal(grid, distances, Pose(-9.0, 0.1)))

@@ -1,4 +1,5 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,17 +8,20 @@ from drawing import grid_from_text
 from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.places.naming import Place, Spot, is_taken_name
+from mapspeak.memory import Landmark, SemanticMap, SemanticMapStore, Waypoint
+from mapspeak.places.naming import AmbiguousPlaceError, Place, Spot, is_taken_name
 from mapspeak.places.relations.choosing import (
     check_place,
     choose_goal,
     find_place,
     find_places,
 )
+from mapspeak.places.standing import find_overlook_of
+from mapspeak.places.things import forget
 from mapspeak.places.ways import find_way
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
+from remembering import look, world_of
 
 DOCK = Waypoint(name="Dock corner", pose=Pose(6.0, 1.5, 0.5))
 ROBOT = Pose(1.5, 1.4, 0.0)
@@ -257,12 +261,12 @@ def test_every_thing_of_a_name_is_meant_whether_it_is_numbered_or_not() -> None:
 
 def test_how_far_the_nearest_is_and_of_how_many_is_told() -> None:
     found = find_place(world_of_chargers(), "nearest charger")
-    assert found.reason.endswith("m by path, of 3")
+    assert found.reason.endswith("m by path from the robot, of 3")
 
 
 @pytest.mark.parametrize("words", ["fourth-nearest charger", "the four nearest chargers"])
 def test_more_things_than_there_are_is_an_error(words: str) -> None:
-    with pytest.raises(GoalError, match="can be reached"):
+    with pytest.raises(GoalError, match=r"only 3 things called 'chargers?'"):
         find_places(world_of_chargers(), words)
 
 
@@ -287,3 +291,41 @@ def test_a_thing_that_cannot_be_come_near_to_is_gone_to_as_near_as_it_is_in_sigh
     assert goal.pose.x > 3.5
     assert abs(goal.pose.yaw_rad) < 0.3
     assert "the nearest place in sight of it" in goal.place.reason
+
+
+def test_what_is_looked_for_from_afar_is_not_told_as_gone_to_as_near_as_it_is_in_sight() -> None:
+    grid = grid_from_text(BEHIND_A_SLOT, resolution_m=0.5)
+    crate = Landmark(label="crate", bearing_rad=0.0)
+    seen = Waypoint(name="far end", pose=Pose(3.0, 1.75, 0.0), functional_landmarks=(crate,))
+    world = WorldModel(grid, seen.pose, SemanticMap(waypoints=(seen,)), radius_m=0.6)
+    (thing,) = world.things
+    assert world.find_approach(thing) is None
+    assert find_overlook_of(world, thing) is not None
+    assert "so the goal is" not in find_place(world, "crate").reason
+
+
+def test_a_thing_is_looked_at_from_where_no_other_known_thing_stands_before_it() -> None:
+    target, other = Point(7.4, 1.5), Point(6.9, 1.5)
+    looks = (
+        look("east a", 4.5, 0.6, ("fire extinguisher", target), range_m=3.0),
+        look("east b", 5.5, 2.2, ("fire extinguisher", target), range_m=2.0),
+    )
+    alone = world_of(*looks)
+    before = check_place(alone, find_place(alone, "fire extinguisher")).pose
+    stool = look("east c", 6.9, 2.6, ("stool", other), yaw_deg=-90.0, range_m=1.1)
+    world = world_of(*looks, stool, previous=alone)
+    (at,) = (each.point for each in world.things if each.thing.label == "stool")
+    pose = check_place(world, find_place(world, "fire extinguisher")).pose
+    assert _aside_m(before, target, at) < 0.3 < _aside_m(pose, target, at)
+
+
+def _aside_m(pose: Pose, target: Point, other: Point) -> float:
+    off_rad = pose.point.bearing_to(other) - pose.point.bearing_to(target)
+    return abs(math.sin(off_rad)) * pose.point.distance_to(other)
+
+
+def test_of_two_places_that_differ_in_case_alone_none_is_forgotten_by_name(tmp_path: Path) -> None:
+    world = _world(SemanticMap(waypoints=(DOCK, Waypoint(name="dock corner", pose=ROBOT))))
+    store = SemanticMapStore(tmp_path / "places.yaml")
+    with pytest.raises(AmbiguousPlaceError, match="2 remembered places are called"):
+        forget(world, store, "dock corner")

@@ -1,8 +1,16 @@
+import dataclasses
+
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.frontiers import Frontier, FrontierReport, find_frontiers, match_frontiers
+from mapspeak.spatial.frontiers import (
+    Frontier,
+    FrontierReport,
+    FrontierVerdict,
+    find_frontiers,
+    match_frontiers,
+)
 
 RADIUS_M = 0.2
 
@@ -85,3 +93,18 @@ def test_a_report_finds_a_frontier_by_its_id() -> None:
     found = report(room_with_openings(20, 20))
     assert found.find("F1") is found.frontiers[0]
     assert found.find("F9") is None
+
+
+def test_an_id_passes_to_the_piece_near_its_place_and_not_to_one_far_off() -> None:
+    before = eastern(report(room_with_openings(20, 20)))
+    piece = np.stack([np.full(20, 6.0), np.arange(20) * 0.05], axis=1)
+    old = dataclasses.replace(before, id="F1", points=piece, pose=Pose(5.8, 0.3))
+    far = dataclasses.replace(old, points=piece[5:], pose=Pose(5.8, 3.0))
+    near = dataclasses.replace(old, points=piece[:8], pose=Pose(5.8, 0.2))
+    first, second = (
+        FrontierReport(
+            frontiers=each, refused=(), verdict=FrontierVerdict.SOME_LEFT, n_named=len(each)
+        )
+        for each in ((old,), (far, near))
+    )
+    assert [each.id for each in match_frontiers(first, second).frontiers] == ["F2", "F1"]

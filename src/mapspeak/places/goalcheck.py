@@ -68,7 +68,7 @@ FARTHEST_M = 1e6
 SEARCH_M = 8.0
 """How far around a goal another one is looked for first."""
 NEAR_M = 1.0
-"""An obstacle nearer than this is the nearest of all in a square twice as wide."""
+"""How far around a goal an obstacle is looked for first."""
 WALL_SIDES_M = 0.15
 """A goal in a wall belongs to the nearer side; to both where they differ by no more than this."""
 
@@ -245,16 +245,18 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
         return 0.0
     # Most goals have something near, and a small window is looked at in no time.
     near_m = _nearest_obstacle_m(grid, cell, NEAR_M)
-    return near_m if near_m <= NEAR_M else _nearest_obstacle_m(grid, cell, SEARCH_M)
+    return near_m if math.isfinite(near_m) else _nearest_obstacle_m(grid, cell, SEARCH_M)
 
 
 def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> float:
-    """Return metres to the nearest obstacle in the square within reach; infinite without one."""
+    """Return metres to the nearest obstacle within reach; infinite without one."""
     margin = math.ceil(reach_m / grid.resolution_m)
     down, across = grid.window(cell.row, cell.col, margin=margin)
     rows, cols = np.nonzero(grid.crop(down, across).occupied)
     off = np.hypot(rows - (cell.row - down.start), cols - (cell.col - across.start))
-    return float(off.min(initial=math.inf)) * grid.resolution_m
+    off_m = float(off.min(initial=math.inf)) * grid.resolution_m
+    # The corners of the square are farther than what lies beyond its sides.
+    return off_m if off_m <= reach_m else math.inf
 
 
 def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid:
@@ -315,6 +317,9 @@ def _say_bounds(check: GoalCheck) -> str:
     if check.bounds is None:
         return ""
     low, high = check.bounds
+    if low.x <= check.goal.x <= high.x and low.y <= check.goal.y <= high.y:
+        # Beside a map that is turned.
+        return ""
     return f", which spans x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
 
 

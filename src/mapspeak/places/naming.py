@@ -18,7 +18,7 @@ from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 MOST_NAMED = 12
 MOST_GUESSES = 3
-ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>\d+)")
+ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>[0-9]{1,9})")
 REGION_ID = re.compile(r"(?<!\w)[RCO]\d+(?!\w)", re.IGNORECASE)
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 SPOT = re.compile(
@@ -159,9 +159,10 @@ def _read_spot(world: WorldModel, words: str) -> Place | None:
     match = SPOT.fullmatch(words)
     if match is None:
         return None
-    point = Point(float(match["x"]), float(match["y"]))
-    yaw_deg = match["yaw_deg"]
-    yaw_rad = None if yaw_deg is None else wrap_angle(math.radians(float(yaw_deg)))
+    point, yaw_deg = Point(float(match["x"]), float(match["y"])), float(match["yaw_deg"] or 0.0)
+    if not all(map(math.isfinite, (point.x, point.y, yaw_deg))):
+        return None
+    yaw_rad = None if match["yaw_deg"] is None else wrap_angle(math.radians(yaw_deg))
     return Place(say_spot(point), Spot(point, yaw_rad))
 
 
@@ -171,9 +172,11 @@ def _what_became_of(world: WorldModel, place: str) -> str:
         return f"{gone.id} is no longer found: its floor is now {' and '.join(gone.became)}."
     if gone is not None:
         return f"{gone.id} is no longer found on the map."
-    if re.fullmatch(r"[Ff]\d+", place) and 1 <= int(place[1:]) <= world.frontiers.n_named:
+    match = ID.fullmatch(place)
+    letter, number = (match["letter"].upper(), int(match["number"])) if match else ("", 0)
+    if letter == "F" and 1 <= number <= world.frontiers.n_named:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
-    if re.fullmatch(r"[Tt]\d+", place) and 1 <= int(place[1:]) <= world.recollection.n_named:
+    if letter == "T" and 1 <= number <= world.recollection.n_named:
         return f"The thing {place.upper()} is no longer remembered."
     if find_elsewhere(world.memory, place):
         return f"{place[:80]!r} is remembered on another map; where that lies is not known here."

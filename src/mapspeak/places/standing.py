@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory.things.approach import OVERLOOK_M, find_overlook
+from mapspeak.memory.things.approach import COMFORT_M, OVERLOOK_M, find_overlook
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
@@ -22,8 +22,6 @@ EVERY_M = 1.0
 """Places to look from are this far from each other."""
 OWN_M = 0.6
 """So near to a thing nothing hides it but itself, or the wall that it hangs on."""
-COMFORT_M = 0.15
-"""How much more than its radius a robot should have around it where it is sent to stand."""
 
 
 def find_standing_point(world: WorldModel, region: Region) -> Point | None:

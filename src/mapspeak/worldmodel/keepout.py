@@ -187,15 +187,29 @@ N_CORNERS = 8
 
 
 def outlines_of_region(rooms: RoomMap, region: Region) -> tuple[Outline, ...]:
-    """Return the outer borders of a region's parts, through the centres of its border cells."""
+    """Return the borders of a region's parts, through the centres of its border cells.
+
+    The outer ones come first, then those around other regions: a corridor closes no room inside it.
+    """
     inside = (rooms.labels == region.index).astype(np.uint8)
-    contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    contours, tree = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    holes = [each for each, (*_, parent) in zip(contours, tree[0], strict=True) if parent >= 0]
+    outer = [each for each, (*_, parent) in zip(contours, tree[0], strict=True) if parent < 0]
     outlines = []
-    for contour in contours:
+    for contour in (*outer, *(each for each in holes if _holds_regions(rooms, region, each))):
         cols, rows = contour[:, 0, 0].astype(np.intp), contour[:, 0, 1].astype(np.intp)
         points = rooms.grid.points_at(rows, cols).tolist()
         outlines.append(tuple(Point(x, y) for x, y in points))
     return tuple(outlines)
+
+
+def _holds_regions(rooms: RoomMap, region: Region, hole: np.ndarray) -> bool:
+    """Return True where a border, as (col, row), runs round floor of other regions."""
+    left, low, width, height = cv2.boundingRect(hole)
+    labels = rooms.labels[low : low + height, left : left + width]
+    within = np.zeros(labels.shape, dtype=np.uint8)
+    cv2.fillPoly(within, [hole - (left, low)], 1)
+    return bool(((within > 0) & (labels > 0) & (labels != region.index)).any())
 
 
 def outline_of_door(rooms: RoomMap, door: Door) -> Outline:

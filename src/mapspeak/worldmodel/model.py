@@ -14,6 +14,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.things.approach import (
+    LARGEST_OFF_M,
     find_approach,
     find_fronts,
     find_least_path_m,
@@ -88,9 +89,9 @@ class Reach:
         standing: Where it would stand in each region, by the region's id.
         out_of_reach: The same for regions it cannot get to.
         frontiers: By the places from which it has looked already.
-        approaches: Where it would stand before a remembered thing, while that is remembered so.
+        approaches: Where it would stand before a remembered thing, by what else is near that.
         overlooks: From where it would look for one that is not known well enough.
-        faced: The share of where a thing may be that it would face there.
+        faced: The share of where a thing may be that it would face there, by the pose.
         fronts: The last floor before a thing, for each who saw it.
         rooms: The rooms before a thing, by id.
         judges: What may be trusted, for a state of the memory.
@@ -101,9 +102,9 @@ class Reach:
     standing: dict[str, Point | None] = field(default_factory=dict)
     out_of_reach: dict[str, Point] = field(default_factory=dict)
     frontiers: dict[Tried, FrontierReport] = field(default_factory=dict)
-    approaches: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
+    approaches: ThingMap[dict[bytes, Pose | None]] = field(default_factory=WeakKeyDictionary)
     overlooks: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
-    faced: ThingMap[float] = field(default_factory=WeakKeyDictionary)
+    faced: ThingMap[dict[Pose, float]] = field(default_factory=WeakKeyDictionary)
     fronts: ThingMap[list[Point]] = field(default_factory=WeakKeyDictionary)
     rooms: ThingMap[tuple[str, ...]] = field(default_factory=WeakKeyDictionary)
     judges: WeakKeyDictionary[Recollection, Judge] = field(default_factory=WeakKeyDictionary)
@@ -277,9 +278,10 @@ class WorldModel:
         thing = remembered.thing
         if (position := thing.position) is None:
             return None
+        others = self.recollection.find_around(position, LARGEST_OFF_M)
         return _keep(
-            self.reach.approaches,
-            remembered,
+            self.reach.approaches.setdefault(remembered, {}),
+            others.tobytes(),
             lambda: find_approach(
                 self.recollection.found.sight,
                 self.distances,
@@ -287,6 +289,7 @@ class WorldModel:
                 _seen_from(remembered),
                 fronts=self._find_fronts(remembered),
                 whereabouts=thing.whereabouts,
+                others=others,
             ),
         )
 
@@ -302,8 +305,8 @@ class WorldModel:
             return 0.0
         sight, seen_from = self.recollection.found.sight, _seen_from(remembered)
         return _keep(
-            self.reach.faced,
-            remembered,
+            self.reach.faced.setdefault(remembered, {}),
+            pose,
             lambda: measure_faced(sight, pose, seen_from, whereabouts),
         )
 

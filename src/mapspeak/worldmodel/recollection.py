@@ -11,7 +11,10 @@ from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from mapspeak.errors import ConfigError
+from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
@@ -22,6 +25,7 @@ from mapspeak.memory.search.meaningindex import Embedder, TextVectors
 from mapspeak.memory.things.finding import Things, find_things
 from mapspeak.memory.things.thing import Category
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.worldmodel.keptthings import keep_things, load_things
 from mapspeak.worldmodel.remembered import (
     Remembered,
@@ -132,6 +136,16 @@ class Recollection:
     def find_thing(self, thing_id: str) -> RememberedThing | None:
         """Return the thing with that id, or None."""
         return next((each for each in self.things if each.id == thing_id), None)
+
+    def find_around(self, point: Point, reach_m: float) -> FloatArray:
+        """Return where things are, one at the point itself too, within reach; shape (n, 2)."""
+        off_m = np.hypot(self._positions[:, 0] - point.x, self._positions[:, 1] - point.y)
+        return self._positions[off_m <= reach_m]
+
+    @cached_property
+    def _positions(self) -> FloatArray:
+        known = (each.thing.position for each in self.things)
+        return np.array([(at.x, at.y) for at in known if at is not None]).reshape(-1, 2)
 
     def find_place(self, name: str) -> RememberedPlace | None:
         """Return the record of exactly that name, or None."""

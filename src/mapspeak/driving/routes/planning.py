@@ -50,8 +50,10 @@ def find_candidates(world: WorldModel, words: str) -> tuple[CheckedGoal, ...]:
 def _find_places(world: WorldModel, words: str) -> list[Place]:
     """Find what words mean; "the nearest door" is nearest on the route, so any door may be it."""
     relation = parse_relation(words)
-    if isinstance(relation, Superlative) and relation == Superlative(kind=relation.kind):
-        near = find_all_near(world, relation.kind)
+    if isinstance(relation, Superlative) and relation == Superlative(
+        kind=relation.kind, label=relation.label
+    ):
+        near = find_all_near(world, relation)
         if near:
             return list(near)
     try:

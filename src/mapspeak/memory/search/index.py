@@ -47,6 +47,9 @@ from mapspeak.memory.search.wordindex import (
 
 WORDS_ONLY = "The search compares words only, no meanings."
 
+_TELLS_APART = re.compile(r"\b(?:with|on|in|at|near|under|behind|beside|for|of|\w*\d\w*)\b")
+"""Words that no name is misspelt by: numbers, ids, and those before a place or a detail."""
+
 _SAME_NAME, _SAME_WORDS, _SAME_WORDS_MISSPELT = 1.0, 0.99, 0.98
 _MOST_WITHOUT_NAME = 0.97
 """Highest similarity of an entry that the request does not name."""
@@ -213,7 +216,7 @@ class EntryIndex:
         likest = self._look_alikes.find(
             " ".join(_words_of(query)), least_ratio=_LEAST_NAME_LIKENESS, limit=1
         )
-        return likest[0] if likest else put_right
+        return likest[0] if likest and _says_no_more(query, likest[0]) else put_right
 
     def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
         common: tuple[AskedWords, ...] = ()
@@ -369,3 +372,9 @@ def _letters_of(request: str) -> str:
 
 def _words_of(text: str) -> list[str]:
     return [word for _, word in content_words(text)]
+
+
+def _says_no_more(query: str, name: str) -> bool:
+    """Return False for a request that says where, or which number, of which a name says nothing."""
+    said, known = (set(_TELLS_APART.findall(each.casefold())) for each in (query, name))
+    return said <= known

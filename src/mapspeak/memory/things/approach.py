@@ -16,12 +16,17 @@ LARGEST_OFF_M = 1.4
 BEST_OFF_M = 1.0
 """Near enough for 1.5 m, far enough to have it ahead even where its place is half a metre off."""
 COMFORT_M = 0.15
+"""How much more than its radius a robot should have around it where it is sent to stand."""
 FACED_M = 1.5
 FACED_RAD = math.radians(30)
 """What is so near, and so little to the side, is faced: a camera has it well in its picture."""
 MISSED_M = 20.0
 """Facing all of where a thing may be is worth so many metres: the best distance hardly counts
 beside it. Of 2, 6 and 20 the last faced most, in the buildings for choosing."""
+HIDDEN_M = 3.0
+"""Another known thing that stands before it is worth so many metres."""
+OTHER_M = 0.3
+"""Sight that passes another thing nearer than this may end at it."""
 N_FINALISTS = 16
 """Lines of sight cost most, so that only so many of the best standing places are asked for them."""
 LOOK_AGAIN_M = 1.5
@@ -48,6 +53,7 @@ def find_approach(
     *,
     fronts: Sequence[Point] | None = None,
     whereabouts: FloatArray | None = None,
+    others: FloatArray | None = None,
 ) -> Pose | None:
     """Find a pose that the robot can drive to and that faces a thing from near.
 
@@ -57,6 +63,7 @@ def find_approach(
     Args:
         fronts: What `find_fronts` gives for these, where it is at hand.
         whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.
+        others: Where things are near it, itself too, shape (n, 2): the map may not show these.
 
     Returns:
         None where the robot cannot get to within 1.4 m in sight of it.
@@ -70,6 +77,8 @@ def find_approach(
     off_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
     tight_m = np.maximum(distances.radius_m + COMFORT_M - clear_m, 0.0)
     costs = np.abs(off_m - BEST_OFF_M) + 2 * tight_m
+    if others is not None:
+        costs += HIDDEN_M * _are_hidden(points, target, others)
     if whereabouts is not None:
         _add_missed(costs, sight, points, target, seen_from, whereabouts)
     place = Point(*points[int(np.argmin(costs))].tolist())
@@ -137,6 +146,17 @@ def measure_faced(
     stands, yaws = np.array([[pose.x, pose.y]]), np.array([pose.yaw_rad])
     is_ahead = _have_ahead(stands, yaws, whereabouts)
     return float((is_ahead & _have_in_sight(sight, stands, seen_from, whereabouts)).mean())
+
+
+def _are_hidden(points: FloatArray, target: Point, others: FloatArray) -> Mask:
+    """Return True for points from which another thing stands before a thing."""
+    ways = np.array([target.x, target.y]) - points
+    far_m = np.maximum(np.hypot(ways[:, :1], ways[:, 1:]), 1e-6)
+    to_others = others[None] - points[:, None]
+    along_m = (to_others * ways[:, None]).sum(axis=2) / far_m
+    aside_m = np.abs(to_others[..., 1] * ways[:, :1] - to_others[..., 0] * ways[:, 1:]) / far_m
+    is_before = (along_m > 0) & (along_m < far_m - OTHER_M) & (aside_m < OTHER_M)
+    return np.asarray(is_before.any(axis=1))
 
 
 def _add_missed(

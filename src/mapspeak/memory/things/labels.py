@@ -47,6 +47,18 @@ def name_the_same(label: str, other: str) -> bool:
     return not _are_marked_apart(one, two) and _have_one_name(one, two)
 
 
+def names_no_less(label: str, asked: str) -> bool:
+    """Return True for a label that names what is asked for and leaves none of it open.
+
+    "charger 2" and "red charger" do for "chargers"; "charger" does for neither of them.
+    """
+    words, known = (
+        tuple(map(_singular, _TOKEN.findall(without_accents(each)))) for each in (asked, label)
+    )
+    is_kind = not set(find_kinds_called(" ".join(words))).isdisjoint(_parts_of(label).kinds)
+    return name_the_same(label, asked) and (is_kind or set(words) <= set(known))
+
+
 @lru_cache(maxsize=MOST_KEPT)
 def hangs_on_walls(label: str) -> bool:
     """Return True for things that hang on walls, as is commonly known: "fire extinguisher"."""

@@ -12,6 +12,7 @@ from mapspeak.places.relations.vocabulary import (
     ORDER,
     ORDERS,
     RANK,
+    RANKS,
     Compass,
     Kind,
     Order,
@@ -23,7 +24,6 @@ from mapspeak.places.relations.vocabulary import (
     read_distance,
     read_order,
 )
-from mapspeak.places.things import RANKS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,14 +120,17 @@ class Middle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Superlative:
-    """The nearest thing of a kind, the second-smallest, and so on.
+    """The nearest thing of a kind or a name, the second-smallest, and so on.
 
     Attributes:
+        kind: None for remembered things.
+        label: What these are called; else empty.
         rank: 1 for the first in that order.
         to: From where ways are measured; None for the robot.
     """
 
-    kind: Kind
+    kind: Kind | None = None
+    label: str = ""
     order: Order = Order.NEAREST
     rank: int = 1
     to: str | None = None
@@ -244,19 +247,28 @@ def _read_wall(match: re.Match[str]) -> Relation:
     return WallSide(of=match["of"], compass=read_compass(match["compass"]), is_along=is_along)
 
 
-def _read_superlative(kind: Kind) -> Read:
+def _read_superlative(kind: Kind | None) -> Read:
     def read(match: re.Match[str]) -> Relation:
-        rank = 1 + RANKS.index(match["rank"].casefold()) if match["rank"] else 1
-        order = read_order(match["order"])
-        return Superlative(kind=kind, order=order, rank=rank, to=match["to"])
+        return Superlative(
+            kind=kind,
+            label=match.groupdict().get("label", ""),
+            order=read_order(match["order"]),
+            rank=1 + RANKS.index(match["rank"].casefold()) if match["rank"] else 1,
+            to=match["to"],
+        )
 
     return read
 
 
-def _read_some(kind: Kind) -> Read:
+def _read_some(kind: Kind | None) -> Read:
     def read(match: re.Match[str]) -> Relation:
-        order, count = read_order(match["order"]), read_count(match["count"])
-        return Several(kind=kind, order=order, count=count, at=match["at"])
+        return Several(
+            kind=kind,
+            label=match.groupdict().get("label", ""),
+            order=read_order(match["order"]),
+            count=read_count(match["count"]),
+            at=match["at"],
+        )
 
     return read
 
@@ -324,12 +336,7 @@ FORMS: tuple[tuple[str, Read], ...] = (
     ),
     (
         rf"{THE}{COUNT} {WAY_ORDER} (?P<label>.+?)(?: (?:to|from) (?P<at>.+))?",
-        lambda m: Several(
-            label=m["label"],
-            order=read_order(m["order"]),
-            count=read_count(m["count"]),
-            at=m["at"],
-        ),
+        _read_some(None),
     ),
     (
         rf"{ALL} (?:(?:remembered|known) )?(?P<label>.+)",
@@ -340,6 +347,10 @@ FORMS: tuple[tuple[str, Read], ...] = (
         lambda m: NextTo(m["of"]),
     ),
     (rf"(?:facing|looking at){OPEN}(?P<of>.+)", lambda m: Facing(m["of"])),
+    (
+        rf"{AT}{RANK}{WAY_ORDER} (?P<label>.+?)(?: (?:to|from) (?P<to>.+))?",
+        _read_superlative(None),
+    ),
 )
 """Tried in this order; the first that fits is meant."""
 

@@ -253,7 +253,9 @@ def find_sides(world: WorldModel, region: Region) -> tuple[list[Wall], Point]:
     else:
         points = points_of(_trace(world, inside))
         floor = world.grid.points_at(*cells_of(world.rooms, region))
-        middle = Point(*floor.mean(axis=0).tolist())
+        # The mean of a floor that bends may lie in another room.
+        away_m = np.hypot(*(floor - floor.mean(axis=0)).T)
+        middle = Point(*floor[int(np.argmin(away_m))].tolist())
     ends = [*points[1:], *points[:1]]
     return [Wall(region, *pair) for pair in zip(points, ends, strict=True)], middle
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
+from mapspeak.memory.things.approach import COMFORT_M
 from mapspeak.places.naming import Place, Spot
-from mapspeak.places.standing import COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel

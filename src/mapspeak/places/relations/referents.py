@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -19,11 +19,13 @@ from mapspeak.places.naming import (
     find_named,
     say_spot,
 )
+from mapspeak.places.relations.grammar import Superlative, parse_relation
 from mapspeak.places.relations.outlines import find_sides
 from mapspeak.places.relations.placement import refuse
 from mapspeak.places.relations.vocabulary import GAP, pattern, plain
 from mapspeak.places.standing import point_ahead
-from mapspeak.places.things import find_place_ids
+from mapspeak.places.things import find_place_ids, find_things
+from mapspeak.places.ways import standing_point
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Door, Region, RoomClass
@@ -44,6 +46,7 @@ class Referent:
 
     Attributes:
         extent: Points over all of it, in metres, shape (n, 2).
+        place: Of what is a place of its own; None for a corner, a wall and what words relate.
         home: The region to stand in beside it; None where any will do.
         front_rad: Where its own front looks; None where it has none.
     """
@@ -51,6 +54,7 @@ class Referent:
     name: str
     anchor: Point
     extent: FloatArray = field(repr=False)
+    place: Place | None = None
     home: Region | None = None
     region: Region | None = None
     door: Door | None = None
@@ -68,6 +72,15 @@ def refer_to(world: WorldModel, place: Place) -> Referent:
     Raises:
         GoalError: It lies farther away than any map reaches.
     """
+    return replace(_refer_to(world, place), place=place)
+
+
+def stands_at(world: WorldModel, thing: Referent) -> Point:
+    """Return the point from which ways to a thing are measured."""
+    return thing.anchor if thing.place is None else standing_point(world, thing.place)
+
+
+def _refer_to(world: WorldModel, place: Place) -> Referent:
     match place.thing:
         case Spot(point=point) if max(abs(point.x), abs(point.y)) > FARTHEST_M:
             raise refuse(f"{place.name} lies farther away than any map reaches.")
@@ -230,7 +243,9 @@ def find_known(world: WorldModel, words: str) -> Referent | None:
             return refer_to(world, place)
     wanted = plain(words)
     place = find_by_kind(world, wanted)
-    return _find_thing(world, wanted) if place is None else refer_to(world, place)
+    if place is not None:
+        return refer_to(world, place)
+    return None if isinstance(parse_relation(wanted), Superlative) else _find_thing(world, wanted)
 
 
 def find_by_kind(world: WorldModel, words: str) -> Place | None:
@@ -290,17 +305,14 @@ def _find_loosely(world: WorldModel, wanted: str) -> Place | None:
 
 def _find_thing(world: WorldModel, wanted: str) -> Referent | None:
     """Find a thing that was seen from remembered places, with "seen from W1" or without."""
-    called = world.recollection.find_called(re.sub(GAP, " ", wanted))
+    called = find_things(world, re.sub(GAP, " ", wanted))
     match = OF_PLACE.fullmatch(wanted)
     if not called and match is not None:
         by = find_named(world, plain(match["place"]))
         if by is not None and isinstance(by.thing, RememberedPlace):
             name = by.thing.waypoint.name
-            called = tuple(
-                each
-                for each in world.recollection.find_called(plain(match["label"]))
-                if name in each.thing.waypoints
-            )
+            labelled = find_things(world, plain(match["label"]))
+            called = [each for each in labelled if name in each.thing.waypoints]
     if not called:
         return None
     located = [each for each in called if each.thing.position is not None]

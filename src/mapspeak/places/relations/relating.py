@@ -55,19 +55,21 @@ from mapspeak.places.relations.referents import (
     refer_to,
     refer_to_door,
     refer_to_point,
+    stands_at,
 )
 from mapspeak.places.relations.superlatives import (
     find_several,
     find_superlative,
     require_one,
 )
-from mapspeak.places.relations.vocabulary import plain
+from mapspeak.places.relations.vocabulary import pattern, plain
 from mapspeak.places.ways import standing_point
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_RELATIONS = 4
 LONGEST_NAME = 80
+DOORS = pattern(r"(?:two )?doors(?: (?:of|in) (?P<room>.+))?")
 BESIDE_M = 1.0
 
 
@@ -84,12 +86,10 @@ def find_related(world: WorldModel, words: str) -> Place | None:
     relation = parse_relation(words)
     if relation is None:
         return find_named(world, plain(words)) or find_by_kind(world, words)
-    reader = Reader(world)
-    if isinstance(relation, Several):
-        found = reader.find_several(relation)
-        return require_one(words, found) if found else None
-    place = reader.find(relation, MOST_RELATIONS - 1)
-    return place if place.name else replace(place, name=" ".join(words.split())[:LONGEST_NAME])
+    place = Reader(world).find(words, relation, MOST_RELATIONS - 1)
+    if place is None or place.name:
+        return place
+    return replace(place, name=" ".join(words.split())[:LONGEST_NAME])
 
 
 def find_several_related(world: WorldModel, words: str) -> tuple[Place, ...]:
@@ -113,10 +113,10 @@ class Reader:
     def __init__(self, world: WorldModel) -> None:
         self._world = world
 
-    def find(self, relation: Relation, n_left: int) -> Place:
-        """Return the place that a relation means, without a name where it is one to stand at.
+    def find(self, words: str, relation: Relation, n_left: int) -> Place | None:
+        """Return the place that words mean, without a name where it is one to stand at.
 
-        `n_left` more relations may stand inside it.
+        `n_left` more relations may stand inside it. None where nothing has the name in an order.
         """
         match relation:
             case Superlative(to=to):
@@ -124,11 +124,15 @@ class Reader:
                 return find_superlative(self._world, relation, start)
             case Several():
                 found = self.find_several(relation)
-                if not found:
-                    raise no_such_place(self._world, relation.label)
-                return require_one(relation.label or f"all {relation.kind}s", found)
+                return require_one(words, found) if found else None
             case _:
                 return self._stand(relation, n_left)
+
+    def _require(self, words: str, relation: Relation, n_left: int) -> Place:
+        place = self.find(words, relation, n_left)
+        if place is None:
+            raise no_such_place(self._world, words)
+        return place
 
     def _stand(self, relation: Standing, n_left: int) -> Place:
         """Return where the robot stands for a relation."""
@@ -178,7 +182,7 @@ class Reader:
         """Return what a phrase is about: the corner itself, say, not where one stands in it."""
         match relation:
             case Superlative():
-                return refer_to(self._world, self.find(relation, n_left))
+                return refer_to(self._world, self._require(words, relation, n_left))
             case Corner():
                 corner = self._find_corners(relation, n_left)[0]
                 return refer_to_point(self._world, corner.name, corner.point, home=corner.region)
@@ -189,7 +193,7 @@ class Reader:
                 middle = find_middle(self._world, thing.region)
                 return refer_to_point(self._world, name, middle, home=thing.region)
             case _:
-                place = self.find(relation, n_left)
+                place = self._require(words, relation, n_left)
                 return refer_to_point(self._world, f"the place {words}", place.point)
 
     def _refer_to_both(self, relation: Between, n_left: int) -> tuple[Referent, Referent]:
@@ -215,18 +219,18 @@ class Reader:
         if len(found) != 2:
             raise refuse(
                 f"{words[:LONGEST_NAME]!r} means {len(found)} places.",
-                [f"between {found[0].name} and {found[-1].name}"],
+                [f"between {found[0].name} and {each.name}" for each in found[1:2]],
             )
         one, other = (refer_to(self._world, place) for place in found)
         return one, other
 
     def _find_both_doors(self, words: str) -> tuple[Referent, Referent] | None:
         """Return the two doors of "between the doors" and "between the doors of R2"."""
-        first, _, rest = plain(words).partition(" ")
-        if plain(words).casefold() not in ("doors", "two doors") and first.casefold() != "doors":
+        match = DOORS.fullmatch(plain(words))
+        if match is None:
             return None
-        room = self._region_of(rest.removeprefix("of "), 0) if first == "doors" and rest else None
-        room = room or find_room_here(self._world)
+        words = match["room"]
+        room = self._region_of(words, 0) if words else find_room_here(self._world)
         doors = self._world.rooms.doors_of(room)
         if len(doors) != 2:
             ids = ", ".join(door.id for door in doors) or "none"
@@ -276,12 +280,12 @@ class Reader:
         thing = self._refer(relation.to, n_left)
         inner = parse_relation(relation.place)
         if inner is not None and find_known(self._world, relation.place) is None:
-            place: Place | None = self.find(inner, n_left)
-            why = "" if place is None else place.reason.removesuffix(", facing it")
+            place = self._require(relation.place, inner, n_left)
+            point = standing_point(self._world, place)
+            why = place.reason.removesuffix(", facing it")
         else:
             at = self._refer(relation.place, n_left)
-            place, why = find_named(self._world, plain(relation.place)), at.name
-        point = at.anchor if place is None else standing_point(self._world, place)
+            point, why = stands_at(self._world, at), at.name
         if point.distance_to(thing.anchor) < self._world.radius_m:
             raise refuse(f"{relation.place} is where {thing.name} is: it cannot be faced there.")
         return stand(point, f"{why}, facing {thing.name}", point.bearing_to(thing.anchor))

@@ -1,5 +1,6 @@
 """Things of a kind in an order: the nearest, the second-smallest, all of them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -8,17 +9,18 @@ import numpy as np
 from mapspeak.places.naming import MOST_NAMED, AmbiguousPlaceError, Place
 from mapspeak.places.relations.grammar import Several, Superlative
 from mapspeak.places.relations.placement import refuse
-from mapspeak.places.relations.referents import ROBOT, Referent
+from mapspeak.places.relations.referents import ROBOT, Referent, stands_at
 from mapspeak.places.relations.vocabulary import Kind, Order, say_order
 from mapspeak.places.standing import cells_of, stand_before
-from mapspeak.places.things import list_alike
+from mapspeak.places.things import list_alike, place_of, say_candidates
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedPlace
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
-Sized = Region | Door | Frontier
+Ordered = Region | Door | Frontier | RememberedPlace | RememberedThing
+Words = Superlative | Several
 
 CLASSES = {
     Kind.CORRIDOR: (RoomClass.CORRIDOR,),
@@ -34,7 +36,7 @@ class Ranked:
     """A thing of a kind, with what it is ordered by: metres by path, or its size."""
 
     value: float
-    thing: Sized | RememberedPlace
+    thing: Ordered
 
     @property
     def place(self) -> Place:
@@ -42,33 +44,32 @@ class Ranked:
         return Place(self.thing.id, self.thing)
 
 
-def find_superlative(world: WorldModel, words: Superlative, start: Referent | None) -> Place:
-    """Find the thing of a kind that is the nearest, the second-smallest and so on.
+def find_superlative(world: WorldModel, words: Superlative, start: Referent | None) -> Place | None:
+    """Find the thing of a kind or a name that is the nearest, the second-smallest and so on.
 
     Args:
         start: From where ways are measured; None for the robot.
 
+    Returns:
+        None for an unused name. What has a name and no id of the map comes without a name.
+
     Raises:
         GoalError: There are too few of them.
     """
-    order, rank = words.order, words.rank
-    if order.is_of_size:
-        ranked, unsure = _sort_by_size(world, words.kind, order)
-    else:
-        ranked, unsure = _sort_by_way(world, words.kind, order, start), ()
+    ranked, left_out = _rank(world, words, start, words.rank)
     if not ranked:
-        raise refuse(_say_none(world, words.kind))
-    title = say_order(order, rank)
-    if rank > len(ranked):
-        works = [f"{say_order(order, n + 1)} {words.kind}" for n in range(len(ranked))]
-        only = "is only one" if len(ranked) == 1 else f"are only {len(ranked)}"
-        raise refuse(f"There {only} {words.kind}, so none is the {title}.", works)
-    found = ranked[rank - 1]
-    if order.is_of_size:
-        reason = _say_size(world, found, len(ranked), f"the {title}", words.kind, unsure)
+        return None
+    found, title = ranked[words.rank - 1], f"the {say_order(words.order, words.rank)}"
+    if isinstance(found.thing, RememberedThing):
+        known = place_of(world, found.thing).reason
+        counted = f", of {len(ranked) + len(left_out)}"
+        return Place("", found.thing, f"{known}; {_say_way(world, found, start)}{counted}")
+    if words.order.is_of_size:
+        reason = _say_size(world, found, ranked, title, words.kind, left_out)
     else:
-        counted = f" of {len(ranked)} that can be reached" if order is Order.FARTHEST else ""
-        reason = f"the {title} {words.kind}{counted}, {_say_way(world, found, start)}"
+        is_counted = words.order is Order.FARTHEST
+        counted = f" of {len(ranked)} that can be reached" if is_counted else ""
+        reason = f"{title} {words.kind}{counted}, {_say_way(world, found, start)}"
     return Place(found.thing.id, found.thing, reason)
 
 
@@ -81,44 +82,19 @@ def find_several(world: WorldModel, words: Several, at: Referent | None) -> tupl
     Raises:
         GoalError: There are too few, or it has no meaning where they are asked for.
     """
-    if words.kind is None:
-        return _find_called(world, words, at)
-    if words.count is None:
-        everything = _list(world, words.kind, SIZED_CLASSES)
-        found = [each for each in everything if _is_at(world, each, at)]
-        if not found:
-            raise refuse(_say_none(world, words.kind))
-        return tuple(Place(each.id, each) for each in found)
-    if words.order.is_of_size:
-        ranked, _ = _sort_by_size(world, words.kind, words.order)
-    else:
-        ranked = _sort_by_way(world, words.kind, words.order, at)
-    if words.count > len(ranked):
-        raise refuse(
-            f"There are only {len(ranked)} of the kind {words.kind} that this can mean.",
-            [each.thing.id for each in ranked[:MOST_NAMED]],
+    if words.count is not None:
+        ranked, _ = _rank(world, words, at, words.count)
+        return tuple(each.place for each in ranked[: words.count])
+    everything = _list(world, words, SIZED_CLASSES)
+    found = [each for each in everything if _is_at(world, each, at)]
+    if not found and words.kind is not None:
+        said = (
+            f"{at.name} has no {words.kind}."
+            if at and everything
+            else _say_too_few(world, words, 0, 0)
         )
-    return tuple(each.place for each in ranked[: words.count])
-
-
-def _find_called(world: WorldModel, words: Several, at: Referent | None) -> tuple[Place, ...]:
-    """Find all things of a name, or the first of them by the way there; () for an unused name."""
-    called = list_alike(world, words.label)
-    if words.count is None or not called:
-        return tuple(Place(each.id, each) for each in called)
-    distances = world.distances if at is None else world.map.distances_from(at.anchor)
-    ways = [(distances.distance_to(stand_before(world, each).point), each) for each in called]
-    sign = -1 if words.order is Order.FARTHEST else 1
-    reached = sorted(
-        ((sign * way_m, each) for way_m, each in ways if way_m is not None),
-        key=lambda found: found[0],
-    )
-    if words.count > len(reached):
-        raise refuse(
-            f"Only {len(reached)} things called {words.label!r} can be reached.",
-            [each.id for _, each in reached[:MOST_NAMED]],
-        )
-    return tuple(Place(each.id, each) for _, each in reached[: words.count])
+        raise refuse(said)
+    return tuple(Place(each.id, each) for each in found)
 
 
 def require_one(words: str, found: Sequence[Place]) -> Place:
@@ -139,50 +115,107 @@ def require_one(words: str, found: Sequence[Place]) -> Place:
     )
 
 
-def find_all_near(world: WorldModel, kind: Kind) -> tuple[Place, ...]:
-    """Find all things of a kind that the robot can get to, nearest first."""
-    return tuple(each.place for each in _sort_by_way(world, kind, Order.NEAREST, None))
+def find_all_near(world: WorldModel, words: Words) -> tuple[Place, ...]:
+    """Find all things of a kind or a name that the robot can get to, nearest first."""
+    ranked, _ = _sort_by_way(world, words, None)
+    return tuple(each.place for each in ranked)
+
+
+def _rank(
+    world: WorldModel, words: Words, start: Referent | None, n_wanted: int
+) -> tuple[list[Ranked], list[Ranked]]:
+    """Return at least so many things in an order, and those left out; none of an unused name.
+
+    The only thing there is comes first though the robot cannot get to it: what is in its way is
+    told of it.
+
+    Raises:
+        GoalError: There are too few, or they have no such order.
+    """
+    if words.order.is_of_size:
+        ranked, left_out = _sort_by_size(world, words)
+    else:
+        ranked, left_out = _sort_by_way(world, words, start)
+    if not ranked and len(left_out) == 1:
+        ranked, left_out = left_out, []
+    n_all = len(ranked) + len(left_out)
+    is_unused = words.kind is None and not _list(world, words)
+    if n_wanted <= len(ranked) or is_unused:
+        return ranked, left_out
+    said = _say_too_few(world, words, len(ranked), n_all)
+    things = [
+        each.thing for each in (*ranked, *left_out) if isinstance(each.thing, RememberedThing)
+    ]
+    if things:
+        raise refuse(said, else_hint=f"They are {say_candidates(world, things)}.")
+    raise refuse(said, [each.thing.id for each in ranked[:MOST_NAMED]])
+
+
+def _say_too_few(world: WorldModel, words: Words, n_found: int, n_all: int) -> str:
+    if words.kind is Kind.FRONTIER and not world.frontiers.frontiers:
+        verdict = str(world.frontiers.verdict).replace("_", " ")
+        return f"There is no frontier to go to: {verdict}."
+    # What ways are measured from does not count.
+    noun = f"{'other ' if n_all < len(_list(world, words)) else ''}{words.kind or 'thing'}"
+    called = "" if words.kind else f" called {words.label[:80]!r}"
+    one, several = f"{noun}{called}", f"{noun}s{called}"
+    if n_found < n_all:
+        which = "are sure" if words.order.is_of_size else "can be reached"
+        return f"Only {n_found} of the {n_all} {several} {which}."
+    if n_all > 1:
+        return f"There are only {n_all} {several}."
+    return f"There is only one {one}." if n_all else f"There is no {one}."
 
 
 def _sort_by_way(
-    world: WorldModel, kind: Kind, order: Order, start: Referent | None
-) -> list[Ranked]:
-    """Return the things of a kind that can be reached, each with its metres by path."""
-    distances = world.distances if start is None else world.map.distances_from(start.anchor)
-    own = None if start is None else (start.region or start.door)
-    ranked = []
-    for each in _list(world, kind):
-        far_m = _measure_way(world, each, distances)
-        if each is not own and far_m is not None and np.isfinite(far_m):
-            ranked.append(Ranked(far_m, each))
-    sign = -1 if order is Order.FARTHEST else 1
-    return sorted(ranked, key=lambda each: sign * each.value)
+    world: WorldModel, words: Words, start: Referent | None
+) -> tuple[list[Ranked], list[Ranked]]:
+    """Return things that can be reached by their metres by path, and those that cannot.
+
+    What ways are measured from is not among them.
+    """
+    distances, own = world.distances, None
+    if start is not None:
+        distances = world.map.distances_from(stands_at(world, start))
+        own = start.place and start.place.thing
+    ranked, left_out = [], []
+    for each in _list(world, words):
+        if each is own:
+            continue
+        way_m = _measure_way(world, each, distances)
+        if way_m is None:
+            left_out.append(Ranked(math.inf, each))
+        else:
+            ranked.append(Ranked(way_m, each))
+    sign = -1 if words.order is Order.FARTHEST else 1
+    return sorted(ranked, key=lambda each: sign * each.value), left_out
 
 
 def _list(
-    world: WorldModel, kind: Kind, classes: Mapping[Kind, tuple[RoomClass, ...]] = CLASSES
-) -> Sequence[Sized | RememberedPlace]:
-    """Return the things of a kind; regions by the classes that count as that kind."""
-    match kind:
+    world: WorldModel, words: Words, classes: Mapping[Kind, tuple[RoomClass, ...]] = CLASSES
+) -> Sequence[Ordered]:
+    """Return the things of a kind or a name; regions by the classes that count as that kind."""
+    match words.kind:
+        case None:
+            return list_alike(world, words.label)
         case Kind.FRONTIER:
             return world.frontiers.frontiers
         case Kind.DOOR:
             return world.rooms.doors
         case Kind.REMEMBERED:
             return world.places
-        case _:
+        case kind:
             regions = world.rooms.regions
             return tuple(each for each in regions if each.room_class in classes[kind])
 
 
-def _measure_way(
-    world: WorldModel, thing: Sized | RememberedPlace, distances: DistanceField
-) -> float | None:
-    """Return the metres by path to a thing, of a region to its nearest floor."""
+def _measure_way(world: WorldModel, thing: Ordered, distances: DistanceField) -> float | None:
+    """Return the metres by path to a thing, of a region to its nearest floor; None without one."""
     match thing:
         case Region() as region:
             reached_m = distances.distances_at(*cells_of(world.rooms, region))
-            return float(reached_m.min(initial=np.inf))
+            least_m = float(reached_m.min(initial=np.inf))
+            return least_m if math.isfinite(least_m) else None
         case Door() as door:
             point = world.find_crossing(door)
             return None if point is None else distances.distance_to(point)
@@ -190,11 +223,11 @@ def _measure_way(
             return distances.distance_to(pose.point)
         case RememberedPlace(waypoint=waypoint):
             return distances.distance_to(waypoint.pose.point)
+        case RememberedThing() as remembered:
+            return distances.distance_to(stand_before(world, remembered).point)
 
 
-def _sort_by_size(
-    world: WorldModel, kind: Kind, order: Order
-) -> tuple[list[Ranked], tuple[Ranked, ...]]:
+def _sort_by_size(world: WorldModel, words: Words) -> tuple[list[Ranked], list[Ranked]]:
     """Return the things of a kind in the order of their size, and those left out.
 
     Rooms that may be parts of others are left out, unless all are such.
@@ -202,33 +235,31 @@ def _sort_by_size(
     Raises:
         GoalError: Things of the kind have no size.
     """
-    if kind is Kind.REMEMBERED:
-        raise refuse("A remembered place has no size.", ["nearest remembered place"])
-    found = [
-        (_size_of(each), each)
-        for each in _list(world, kind, SIZED_CLASSES)
-        if not isinstance(each, RememberedPlace)
+    sized = [
+        Ranked(_size_of(each), each)
+        for each in _list(world, words, SIZED_CLASSES)
+        if isinstance(each, (Region, Door, Frontier))
     ]
-    sign = -1 if order is Order.LARGEST else 1
-    ranked = sorted(
-        (Ranked(size, each) for size, each in found), key=lambda each: sign * each.value
-    )
+    if words.kind is Kind.REMEMBERED:
+        raise refuse("A remembered place has no size.", ["nearest remembered place"])
+    sign = -1 if words.order is Order.LARGEST else 1
+    ranked = sorted(sized, key=lambda each: sign * each.value)
     sure = [each for each in ranked if not _is_unsure(world, each.thing)]
-    unsure = tuple(each for each in ranked if _is_unsure(world, each.thing)) if sure else ()
+    unsure = [each for each in ranked if _is_unsure(world, each.thing)] if sure else []
     return sure or ranked, unsure
 
 
-def _size_of(thing: Sized) -> float:
+def _size_of(thing: Region | Door | Frontier) -> float:
     match thing:
         case Region(floor_area_m2=size) | Frontier(gain_m2=size) | Door(width_m=size):
             return size
 
 
-def _is_unsure(world: WorldModel, thing: Sized | RememberedPlace) -> bool:
+def _is_unsure(world: WorldModel, thing: Ordered) -> bool:
     return isinstance(thing, Region) and world.rooms.find_doubtful_door(thing) is not None
 
 
-def _is_at(world: WorldModel, thing: Sized | RememberedPlace, at: Referent | None) -> bool:
+def _is_at(world: WorldModel, thing: Ordered, at: Referent | None) -> bool:
     """Return True for what belongs to a region: its doors, what was remembered or ends in it."""
     if at is None:
         return True
@@ -243,34 +274,42 @@ def _is_at(world: WorldModel, thing: Sized | RememberedPlace, at: Referent | Non
             return world.find_room_id(pose.point) == at.region.id
         case RememberedPlace(waypoint=waypoint):
             return world.find_room_id(waypoint.pose.point) == at.region.id
+        case RememberedThing() as remembered:
+            return at.region.id in world.rooms_before(remembered)
 
 
 def _say_size(
-    world: WorldModel, found: Ranked, n_all: int, title: str, kind: Kind, unsure: Sequence[Ranked]
+    world: WorldModel,
+    found: Ranked,
+    ranked: Sequence[Ranked],
+    title: str,
+    kind: Kind | None,
+    unsure: Sequence[Ranked],
 ) -> str:
     thing = found.thing
     unit = "m wide" if isinstance(thing, Door) else "m2"
     digits = 2 if isinstance(thing, Door) else 1
     so_far = " so far" if isinstance(thing, Region) and world.may_hide_rooms else ""
-    said = f"{title} of {n_all} {kind}s{so_far}, {found.value:.{digits}f} {unit}"
-    if n_all == 1:
+    said = f"{title} of {len(ranked)} {kind}s{so_far}, {found.value:.{digits}f} {unit}"
+    if len(ranked) == 1:
         said = f"the only {kind}{so_far}, {found.value:.{digits}f} {unit}"
     if isinstance(thing, Region) and thing.id in world.growth_m2:
         said += ", not all seen"
     if isinstance(thing, Region) and _is_unsure(world, thing):
         said += ", unsure"
+    for each in ranked:
+        most_m2 = each.value + world.growth_m2.get(each.thing.id, 0.0)
+        if isinstance(each.thing, Region) and each.value < found.value <= most_m2:
+            said += f"; {each.thing.id} ({each.value:.1f} m2) is not all seen and may be larger"
     left = ", ".join(f"{each.thing.id} ({each.value:.{digits}f} {unit})" for each in unsure)
     return f"{said}; unsure ones are left out: {left}" if left else said
 
 
 def _say_way(world: WorldModel, found: Ranked, start: Referent | None) -> str:
     who = ROBOT if start is None else start.name
-    at = world.robot.point if start is None else start.anchor
-    is_in = found.thing.id == world.find_room_id(at)
-    return f"{who} is in it" if is_in else f"{found.value:.1f} m by path from {who}"
-
-
-def _say_none(world: WorldModel, kind: Kind) -> str:
-    if kind is Kind.FRONTIER:
-        return f"There is no frontier to go to: {str(world.frontiers.verdict).replace('_', ' ')}."
-    return f"There is no {kind} that the robot can get to."
+    at = world.robot.point if start is None else stands_at(world, start)
+    if found.thing.id == world.find_room_id(at):
+        return f"{who} is in it"
+    if math.isinf(found.value):
+        return f"no way leads to it from {who}"
+    return f"{found.value:.1f} m by path from {who}"

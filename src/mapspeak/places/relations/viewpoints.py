@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory.things.approach import COMFORT_M
 from mapspeak.places.goalcheck import check_goal
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal, find_place
-from mapspeak.places.standing import COMFORT_M, choose_crossing, point_ahead, spread_places
+from mapspeak.places.standing import choose_crossing, point_ahead, spread_places
 from mapspeak.spatial.fieldofview import (
     N_RAYS,
     SIGHT_M,

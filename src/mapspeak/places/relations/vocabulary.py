@@ -5,7 +5,6 @@ import re
 from enum import StrEnum
 
 from mapspeak.places.naming import NUMBER
-from mapspeak.places.things import RANKS
 
 
 class Side(StrEnum):
@@ -37,6 +36,7 @@ class Compass(StrEnum):
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 UNIT = r"(?P<unit>m|met(?:er|re)s?|cm|centimet(?:er|re)s?|mm|millimet(?:er|re)s?)"
+RANKS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 COUNTS = ("half", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 DISTANCE = rf"(?P<number>{NUMBER}|half a|an?|{'|'.join(COUNTS[1:])})[\s_-]*{UNIT}"
 GAP = r"(?:[\s_]|-(?![\d.]))+"

@@ -159,20 +159,13 @@ def match_frontiers(previous: FrontierReport, current: FrontierReport) -> Fronti
 
 def _inherited(previous: tuple[Frontier, ...], current: tuple[Frontier, ...]) -> dict[int, str]:
     """Return the ids that pass on, largest overlap first, by index among the current ones."""
-    overlaps = (
-        (_overlap_ratio(old.points, new.points), index, old.id)
+    return match_best_first(
+        ((-ratio, index), old.id, index)
         for old in previous
         for index, new in enumerate(current)
+        if old.pose.point.distance_to(new.pose.point) <= SAME_PLACE_M
+        and (ratio := _overlap_ratio(old.points, new.points)) >= SAME_RATIO
     )
-    ids = match_best_first(
-        ((-ratio, index), old_id, index) for ratio, index, old_id in overlaps if ratio >= SAME_RATIO
-    )
-    places = {old.id: old.pose.point for old in previous}
-    return {
-        index: old_id
-        for index, old_id in ids.items()
-        if places[old_id].distance_to(current[index].pose.point) <= SAME_PLACE_M
-    }
 
 
 def _overlap_ratio(first: FloatArray, second: FloatArray) -> float:
