@@ -450,3 +450,19 @@ def test_whatever_is_asked_for_the_pose_can_be_reached_or_the_answer_says_why_no
     cell = world.grid.cell_at(pose.point)
     assert float(np.asarray(world.map.clearance_m)[cell.row, cell.col]) >= world.radius_m
     assert place.reason
+
+
+def test_what_lies_behind_a_wall_is_not_faced_through_it() -> None:
+    world = _world()
+    _go(world, "facing 3.0, 3.4")
+    with pytest.raises(GoalError, match="does the robot see"):
+        find_place(world, "facing 3.0, 5.0")
+
+
+@pytest.mark.parametrize("words", ["R1 facing back", "the north wall of R1"])
+def test_what_is_advised_instead_is_not_promised_where_no_way_leads(words: str) -> None:
+    shut = _world(text=FLAT.replace("#" + "." * 40 + "#", FLAT.split("\n")[2]))
+    with pytest.raises(GoalError) as error:
+        find_place(shut, words)
+    assert "would work" not in str(error.value)
+    assert "in the way" not in str(error.value)

@@ -208,7 +208,7 @@ def stand_at_wall(world: WorldModel, walls: Sequence[Wall], *, is_along: bool) -
     found = (_stand_at(world, wall, is_along=is_along) for wall in walls)
     place = next(filter(None, found), None)
     if place is None:
-        raise refuse(f"The robot can stand nowhere at {walls[0].name}: something is in the way.")
+        raise refuse(f"The robot can stand nowhere at {walls[0].name}.")
     return place
 
 

@@ -18,6 +18,8 @@ IN_DOOR_M = 0.5
 AT_ONCE = 512
 """Number of lines of sight that are computed together."""
 MOST_EXTENT = 256
+BODY_M = 1.0
+"""Largest distance from what is seen of a thing to its middle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,18 +128,20 @@ def _find_in_doors(world: WorldModel, points: FloatArray, centre: Point, reach_m
 def is_in_sight(world: WorldModel, points: FloatArray, thing: Point) -> Mask:
     """Return True for the points from which nothing stands before a thing.
 
-    The thing itself may be an obstacle: once a line has met what it ends in, no floor follows.
+    The thing itself may be an obstacle: once a line has met what it ends in, no floor follows, and
+    it is not far to its middle.
     """
     grid = world.grid
     if not len(points):
         return np.zeros(0, dtype=np.bool_)
     lines = np.array([thing.x, thing.y]) - points
-    longest_m = float(np.hypot(lines[:, 0], lines[:, 1]).max())
-    shares = np.linspace(0.0, 1.0, math.ceil(longest_m / grid.resolution_m * 2) + 2)
+    far_m = np.hypot(lines[:, 0], lines[:, 1])
+    shares = np.linspace(0.0, 1.0, math.ceil(float(far_m.max()) / grid.resolution_m * 2) + 2)
     steps = points[:, None, :] + shares[None, :, None] * lines[:, None, :]
     is_floor = grid.look_up(grid.free, steps, outside=False)
     is_blocked = np.logical_or.accumulate(~is_floor, axis=1)
-    return np.asarray(~(is_blocked & is_floor).any(axis=1), dtype=np.bool_)
+    is_far = far_m[:, None] * (1.0 - shares) > BODY_M
+    return np.asarray(~(is_blocked & (is_floor | is_far)).any(axis=1), dtype=np.bool_)
 
 
 def stand(point: Point, reason: str, yaw_rad: float | None = None) -> Place:
@@ -151,7 +155,7 @@ def stand(point: Point, reason: str, yaw_rad: float | None = None) -> Place:
 def refuse(what: str, works: Sequence[str] = (), *, else_hint: str = "") -> GoalError:
     """Return the error for what nothing fits, with what would."""
     if works:
-        else_hint = f"What would work: {join_or(works)}."
+        else_hint = f"Try {join_or(works)}."
     if else_hint:
         return GoalError(what, hint=else_hint)
     return GoalError(what, hint="Name another place.", step=NextStep.MEASURE)

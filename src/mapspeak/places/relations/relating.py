@@ -265,7 +265,9 @@ class Reader:
         }
         reached: dict[Door, float] = {door: m for door, m in ways_m.items() if m is not None}
         if not reached:
-            raise refuse(f"The robot gets through no door of {room.id}.", [f"facing {room.id}"])
+            raise refuse(
+                f"The robot gets through no door of {room.id}.", [f"the middle of {room.id}"]
+            )
         door = min(reached, key=lambda each: reached[each])
         at, why = standing_point(world, Place(room.id, room)), f"in {room.id}, facing {door.id}"
         sees = is_in_sight(world, np.array([[at.x, at.y]]), door.place)

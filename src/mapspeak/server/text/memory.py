@@ -225,9 +225,9 @@ def say_consequences(world: WorldModel, event: Event, now: datetime) -> str:
 def describe_nearby(world: WorldModel, nearby: Nearby) -> str:
     """Return which thing was taken for the one that is meant, and the things nearest to it."""
     thing = nearby.thing
-    where = say_point(thing.point)
+    where, there = say_point(thing.point), "it"
     if thing.thing.position is None:
-        where = f"a place not noted, seen from {where}"
+        where, there = f"a place not noted, seen from {where}", "where it was seen from"
     lines = [f"Nearest to {_say_thing(world, thing)}, at {where}."]
     if nearby.others:
         others = "; ".join(_say_thing(world, each) for each in nearby.others[:MOST_THINGS])
@@ -237,7 +237,7 @@ def describe_nearby(world: WorldModel, nearby: Nearby) -> str:
         )
     nearest = nearby.nearest[:MOST_THINGS]
     told = [f"{_say_thing(world, each)}, {away_m:.1f} m" for each, away_m in nearest]
-    lines.append(f"Things nearest to it: {'; '.join(told) or 'none known there'}.")
+    lines.append(f"Things nearest to {there}: {'; '.join(told) or 'none known there'}.")
     lines.append("Observations without it, by how near to it they were made:")
     return "\n".join(lines)
 
