@@ -329,3 +329,9 @@ def test_of_two_places_that_differ_in_case_alone_none_is_forgotten_by_name(tmp_p
     store = SemanticMapStore(tmp_path / "places.yaml")
     with pytest.raises(AmbiguousPlaceError, match="2 remembered places are called"):
         forget(world, store, "dock corner")
+
+
+def test_a_number_that_is_none_is_no_goal() -> None:
+    for x, y in ((1.0, math.nan), (math.nan, 1.0), (1.0, math.inf)):
+        with pytest.raises(GoalError, match="not a valid goal"):
+            choose_goal(_world(), place=None, x=x, y=y, yaw_deg=None)

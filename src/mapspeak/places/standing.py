@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -54,6 +54,13 @@ def choose_crossing(world: WorldModel, door: Door) -> Point:
         opened = world.map.open.distances_from(world.robot.point)
         found = find_crossing(world.rooms, opened, door)
     return found or door.place
+
+
+def reach_doors(world: WorldModel, doors: Iterable[Door]) -> list[tuple[float, Door, Point]]:
+    """Return the doors that the robot passes, nearest first: metres to it, the door, and where."""
+    crossings = ((door, world.find_crossing(door)) for door in doors)
+    reached = [(world.path_m(at) or 0.0, door, at) for door, at in crossings if at is not None]
+    return sorted(reached, key=lambda each: (each[0], each[1].id))
 
 
 def _search(world: WorldModel, revision: MapRevision, region: Region) -> Point | None:
@@ -123,7 +130,7 @@ def arrival_pose(world: WorldModel, point: Point) -> Pose:
     end with a step aside, and the robot should not turn for that, nor for a way shorter than its
     radius.
     """
-    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    is_near = abs(point.x) < FARTHEST_M and abs(point.y) < FARTHEST_M
     path = world.map.find_path_over(world.distances, point) if is_near else None
     if path is None or path.length_m < world.radius_m:
         return Pose(point.x, point.y, world.robot.yaw_rad)

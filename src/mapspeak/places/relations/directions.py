@@ -21,6 +21,7 @@ from mapspeak.places.relations.referents import (
     refer_to_door,
 )
 from mapspeak.places.relations.vocabulary import Compass, Side, read_heading
+from mapspeak.places.standing import reach_doors
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 
@@ -87,16 +88,13 @@ def front_of_region(world: WorldModel, region: Region) -> Referent:
     Raises:
         GoalError: No door of it can be reached.
     """
-    crossings = ((world.find_crossing(door), door) for door in world.rooms.doors_of(region))
-    reached = [
-        (world.path_m(crossing) or 0.0, door.id, door) for crossing, door in crossings if crossing
-    ]
+    reached = reach_doors(world, world.rooms.doors_of(region))
     if not reached:
         raise refuse(
             f"{region.id} has no door that the robot can get to, so it has no front.",
             [f"north of {region.id}", f"next to {region.id}"],
         )
-    door = min(reached, key=lambda each: each[:2])[2]
+    _, door, _ = reached[0]
     name = f"{region.id} (its door {door.id})"
     return refer_to_door(world, door, other_side(world, door, region), name=name)
 

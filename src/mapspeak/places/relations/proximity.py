@@ -17,7 +17,7 @@ from mapspeak.places.relations.placement import (
     tolerance_m,
 )
 from mapspeak.places.relations.referents import ROBOT, Referent, find_normal, point_before
-from mapspeak.places.standing import point_along
+from mapspeak.places.standing import point_along, reach_doors
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
 
@@ -179,15 +179,11 @@ def stand_between(world: WorldModel, one: Referent, other: Referent) -> Place:
 
 def _stand_in_door(world: WorldModel, one: Region, other: Region) -> Place | None:
     """Return the nearest door that joins two regions; two that are one have none."""
-    crossings = [
-        (world.path_m(crossing) or 0.0, door.id, crossing)
-        for door in world.rooms.doors_between(one.id, other.id)
-        if (crossing := world.find_crossing(door)) is not None
-    ]
-    if not crossings:
+    reached = reach_doors(world, world.rooms.doors_between(one.id, other.id))
+    if not reached:
         return None
-    _, door_id, point = min(crossings, key=lambda each: each[:2])
-    return stand(point, f"in {door_id}, the door between {one.id} and {other.id}")
+    _, door, point = reached[0]
+    return stand(point, f"in {door.id}, the door between {one.id} and {other.id}")
 
 
 def _stand_straight(world: WorldModel, one: Point, other: Point, both: str) -> Place | None:

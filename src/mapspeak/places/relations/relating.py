@@ -63,8 +63,9 @@ from mapspeak.places.relations.superlatives import (
     require_one,
 )
 from mapspeak.places.relations.vocabulary import pattern, plain
+from mapspeak.places.standing import reach_doors
 from mapspeak.places.ways import standing_point
-from mapspeak.spatial.rooms import Door, Region
+from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_RELATIONS = 4
@@ -258,17 +259,12 @@ class Reader:
     def _stand_looking_back(self, words: str, n_left: int) -> Place:
         """Return where to stand in a room and see the door that the robot comes in by."""
         world, room = self._world, self._region_of(words, n_left)
-        ways_m = {
-            door: world.path_m(point)
-            for door in world.rooms.doors_of(room)
-            if (point := world.find_crossing(door)) is not None
-        }
-        reached: dict[Door, float] = {door: m for door, m in ways_m.items() if m is not None}
+        reached = reach_doors(world, world.rooms.doors_of(room))
         if not reached:
             raise refuse(
                 f"The robot gets through no door of {room.id}.", [f"the middle of {room.id}"]
             )
-        door = min(reached, key=lambda each: reached[each])
+        _, door, _ = reached[0]
         at, why = standing_point(world, Place(room.id, room)), f"in {room.id}, facing {door.id}"
         sees = is_in_sight(world, np.array([[at.x, at.y]]), door.place)
         if not sees[0]:

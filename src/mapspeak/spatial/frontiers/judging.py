@@ -1,8 +1,8 @@
 """Judge borders with the unknown: which are frontiers to go to, and why others are refused."""
 
-import dataclasses
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,8 +60,7 @@ def find_frontiers(
     ranked, ways = rank(distances, merge_by_place(frontiers))
     return FrontierReport(
         frontiers=tuple(
-            dataclasses.replace(frontier, id=f"F{number}")
-            for number, frontier in enumerate(ranked, start=1)
+            replace(frontier, id=f"F{number}") for number, frontier in enumerate(ranked, start=1)
         ),
         refused=tuple(sorted(refused, key=lambda border: -border.length_m)),
         verdict=_verdict(distances, ranked, has_borders=bool(borders or n_short)),
@@ -85,9 +84,9 @@ def rerank_frontiers(report: FrontierReport, distances: DistanceField) -> Fronti
         distance_m = distances.distance_to(frontier.pose.point)
         if distance_m is None:
             return None
-        moved.append(dataclasses.replace(frontier, distance_m=distance_m))
+        moved.append(replace(frontier, distance_m=distance_m))
     ranked, ways = rank(distances, moved, report.ways)
-    return dataclasses.replace(report, frontiers=tuple(ranked), ways=ways)
+    return replace(report, frontiers=tuple(ranked), ways=ways)
 
 
 def _verdict(
@@ -133,8 +132,8 @@ def _judge(
             poor.append(border)
     for border, beyond in zip(poor, find_parts_beyond(distances, poor), strict=True):
         if beyond is None:
-            why = RefusalReason.NOTHING_TO_SEE
-            refused.append(_refuse(distances, border, why, least_gain_m2=least_m2))
+            poorly = _refuse(distances, border, RefusalReason.NOTHING_TO_SEE)
+            refused.append(replace(poorly, least_gain_m2=least_m2))
         else:
             cut_off.append(beyond)
     return frontiers, refused + _refuse_cut_off(distances, cut_off)
@@ -214,27 +213,16 @@ def _refuse_tried(
     if reason is not RefusalReason.PROVED_NARROW:
         return refused
     gap = min(tried.gaps, key=lambda each: each.point.distance_to(refused.anchor))
-    return dataclasses.replace(refused, gap_at=gap.point, gap_width_m=gap.width_m)
+    return replace(refused, gap_at=gap.point, gap_width_m=gap.width_m)
 
 
-def _refuse(
-    distances: DistanceField,
-    border: Border,
-    reason: RefusalReason,
-    *,
-    gap_width_m: float = 0.0,
-    needed_width_m: float = 0.0,
-    least_gain_m2: float = 0.0,
-) -> RefusedFrontier:
+def _refuse(distances: DistanceField, border: Border, reason: RefusalReason) -> RefusedFrontier:
     middle = find_middle(border.rows, border.cols)
     anchor = Cell(int(border.rows[middle]), int(border.cols[middle]))
     return RefusedFrontier(
         anchor=distances.grid.point_at(anchor),
         length_m=border.length_m,
         reason=reason,
-        gap_width_m=gap_width_m,
-        needed_width_m=needed_width_m,
-        least_gain_m2=least_gain_m2,
     )
 
 
@@ -244,10 +232,8 @@ def _refuse_cut_off(distances: DistanceField, borders: Sequence[Border]) -> list
     return [
         _refuse(distances, border, RefusalReason.NO_WAY)
         if width_m is None
-        else _refuse(
-            distances,
-            border,
-            RefusalReason.TOO_NARROW,
+        else replace(
+            _refuse(distances, border, RefusalReason.TOO_NARROW),
             gap_width_m=width_m,
             needed_width_m=needed_m,
         )
@@ -273,5 +259,5 @@ def merge_by_place(frontiers: list[Frontier]) -> list[Frontier]:
             others = [waiting[other] for other in near if other != index]
             points = np.concatenate([frontier.points, *(other.points for other in others)])
             length_m = frontier.length_m + sum(other.length_m for other in others)
-            merged.append(dataclasses.replace(frontier, points=points, length_m=length_m))
+            merged.append(replace(frontier, points=points, length_m=length_m))
     return merged
