@@ -148,6 +148,9 @@ def _rank(
     ]
     if things:
         raise refuse(said, else_hint=f"They are {say_candidates(world, things)}.")
+    if isinstance(words, Superlative):
+        those = [f"{say_order(words.order, n + 1)} {words.kind}" for n in range(len(ranked))]
+        raise refuse(said, those)
     raise refuse(said, [each.thing.id for each in ranked[:MOST_NAMED]])
 
 
