@@ -71,6 +71,26 @@ def test_what_a_fleet_writes_at_once_is_all_stored(address: str, tmp_path: Path)
     assert len(dock.landmarks) == 80
 
 
+def test_a_database_that_isolates_transactions_more_than_usual_stores_all(
+    address: str, tmp_path: Path
+) -> None:
+    with psycopg.connect(address, autocommit=True) as other:
+        name = other.info.dbname
+        other.execute(
+            f"ALTER DATABASE {name} SET default_transaction_isolation TO serializable".encode()
+        )
+
+    def write(robot: int) -> None:
+        with closing(open_store(address, tmp_path)) as store:
+            store.remember(place("dock", f"thing {robot}"))
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(write, range(8)))
+
+    with closing(open_store(address, tmp_path)) as store:
+        assert len(store.read().waypoints[0].landmarks) == 8
+
+
 @pytest.mark.anyio
 async def test_what_one_robot_of_a_fleet_notes_the_others_find_at_once(
     address: str, tmp_path: Path

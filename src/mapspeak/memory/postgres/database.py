@@ -105,6 +105,8 @@ class Database:
             application_name="mapspeak",
             options=f"-c statement_timeout={STATEMENT_TIMEOUT_MS}",
         )
+        # Whoever has waited for a lock reads what was written meanwhile, whatever is usual there.
+        self._connection.isolation_level = psycopg.IsolationLevel.READ_COMMITTED
         try:
             _migrate(self._connection)
         except BaseException:
