@@ -8,7 +8,7 @@ import pytest
 
 from mapspeak.geometry import Pose
 from mapspeak.links.simulated import SoloRobot
-from mapspeak.robot import GoalState
+from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.simulator import Simulation, StateRecord, World
 from mapspeak.skill import JsonValue, SkillCode, SkillOutcome, SkillProgress, SkillState
 from skilledworld import make_workshop
@@ -117,3 +117,22 @@ async def test_a_skill_fails_as_often_as_the_world_says(workshop: World) -> None
     states = [(await owner.run("speak", text="Hello")).state for _ in range(3)]
     assert states == [SkillState.FAILED, SkillState.FAILED, SkillState.SUCCEEDED]
     assert owner.deeds[-1] == "speak: Hello"
+
+
+class WaitingRobot(SoloRobot):
+    """Takes a goal and waits before it begins to drive, as a guarded robot may."""
+
+    n_looks = 0
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        self.n_looks += 1
+        if self.n_looks < 3:
+            return GoalStatus(state=GoalState.ACCEPTED)
+        return await super().fetch_goal_status(robot_goal_id)
+
+
+async def test_docking_waits_for_a_drive_that_has_not_begun_yet(workshop: World) -> None:
+    owner = Owner(workshop)
+    owner.robot = WaitingRobot(owner.simulation, has_detector=False)
+    outcome = await owner.run("dock", until_percent=0.0)
+    assert outcome.state is SkillState.SUCCEEDED

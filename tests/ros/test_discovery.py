@@ -207,6 +207,40 @@ def test_of_several_robots_the_one_of_the_namespace_is_taken() -> None:
     assert profile.name == "beta"
 
 
+def test_what_the_chosen_robot_lacks_is_not_taken_from_another_one() -> None:
+    types = {
+        **{topic: name for topic, name in in_namespaces("alpha").items()},
+        "/beta/tf": "tf2_msgs/TFMessage",
+        "/map": GRID,
+        "/camera/image_raw": "sensor_msgs/Image",
+    }
+    profile = choose(
+        types,
+        frames=frozenset({"map", "alpha/base_link"}),
+        namespace="beta",
+        actions=("/alpha/navigate_to_pose",),
+    )
+    assert profile.navigation is NavigationKind.NONE
+    assert profile.velocity_topic is None
+    assert profile.scan_topic is None
+    assert profile.base_frame == "base_link"
+    # What is in no robot's namespace serves all of them.
+    assert profile.map_topic == "/map"
+    assert profile.camera_topic == "/camera/image_raw"
+
+
+@pytest.mark.parametrize(
+    ("frames", "actions"),
+    [({"map", "alpha/base_link"}, ()), ({"map"}, ("/alpha/navigate_to_pose",))],
+)
+def test_another_robot_is_known_by_its_frames_and_its_navigation_too(
+    frames: set[str], actions: tuple[str, ...]
+) -> None:
+    types = {"/tf": "tf2_msgs/TFMessage", "/alpha/cmd_vel": "geometry_msgs/Twist"}
+    found = choose(types, frames=frozenset(frames), actions=actions, namespace="beta")
+    assert found.velocity_topic is None
+
+
 def test_every_field_that_a_person_says_is_taken_as_it_stands() -> None:
     profile = choose(
         TURTLEBOT_4,

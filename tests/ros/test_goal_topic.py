@@ -29,7 +29,7 @@ async def test_a_turn_has_ended_when_the_robot_has_turned_or_stands_for_a_while(
             client,
             "/goal_pose",
             dialect=Dialect.ROS2,
-            map_frame="map",
+            map_frame=lambda: "map",
             fetch_pose=fetch_pose,
             now_s=lambda: now_s,
         )

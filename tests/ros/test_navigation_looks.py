@@ -144,3 +144,12 @@ def test_of_several_robots_the_topics_of_the_chosen_one_are_taken() -> None:
     types = {"/ada/plan": "nav_msgs/Path", "/ben/plan": "nav_msgs/Path", "/plan": "x/Other"}
     assert find_navigation_topics(types, namespace="/ben") == {NavigationPart.PLAN: "/ben/plan"}
     assert find_navigation_topics({}, namespace="") == {}
+
+
+@both
+async def test_no_whole_costmap_is_left_out_since_the_next_may_be_a_part(ros: int) -> None:
+    scripted = with_navigation(ros)
+    await looks_of(scripted)
+    topic = f"{NAMES[ros][2]}/local_costmap/costmap"
+    asked = [each for each in scripted.server.asked("subscribe") if each["topic"] == topic]
+    assert [each.get("throttle_rate") for each in asked] == [None]

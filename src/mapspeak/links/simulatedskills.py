@@ -89,13 +89,13 @@ async def _dock(hands: Hands, given: Arguments, on_progress: OnProgress) -> Skil
 
 async def _drive(robot: Robot, goal: Pose) -> GoalState:
     goal_id = await robot.send_goal(goal)
-    state = GoalState.DRIVING
+    state = GoalState.ACCEPTED
     try:
-        while state is GoalState.DRIVING:
+        while not state.is_final:
             await robot.sleep(LOOK_S)
             state = (await robot.fetch_goal_status(goal_id)).state
     finally:
-        if state is GoalState.DRIVING:
+        if not state.is_final:
             with anyio.CancelScope(shield=True):
                 await robot.cancel_goal(goal_id)
     return state

@@ -195,7 +195,7 @@ class RosConnection(Advertising, ParameterServices):
         """Return the subscription to a topic; begin one where there is none yet.
 
         The type is as this ROS writes it; None looks it up. Throttling keeps a least time between
-        two messages; the first request sets it.
+        two messages, the least of all that were asked for.
         """
         subscription = self._subscriptions.get(topic)
         if subscription is None:
@@ -203,6 +203,10 @@ class RosConnection(Advertising, ParameterServices):
             subscription = Subscription(topic, type_name=type_name, throttle_ms=throttle_ms)
             self._begin(subscription)
             self._subscriptions[topic] = subscription
+        elif throttle_ms < subscription.throttle_ms:
+            subscription.throttle_ms = throttle_ms
+            self._end(subscription)
+            self._begin(subscription)
         subscription.n_users += 1
         return subscription
 

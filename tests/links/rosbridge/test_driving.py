@@ -265,6 +265,10 @@ async def test_a_robot_that_only_takes_poses_is_blocked_when_it_stands_elsewhere
         await robot.fetch_goal_status(goal_id)
         await be_at(scripted, robot, Pose(1.0, 2.0, 0.5), second=30)
         status = await robot.fetch_goal_status(goal_id)
+        await scripted.until(lambda: len(published(scripted, "/goal_pose")) == 2)
+    # It must not drive on to the goal that was given up.
+    here = published(scripted, "/goal_pose")[1]["msg"]["pose"]["position"]
+    assert (here["x"], here["y"]) == (1.0, 2.0)
     assert status.state is GoalState.BLOCKED
     assert status.cause is not None
     assert status.cause.code is CauseCode.STOOD_STILL

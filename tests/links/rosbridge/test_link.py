@@ -8,6 +8,7 @@ from typing import Any
 
 import anyio
 import numpy as np
+import orjson
 import pytest
 from PIL import Image
 
@@ -17,6 +18,7 @@ from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RosbridgeClient, open_rosbridge_robot
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
+from mapspeak.ros.actions import open_action
 from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings
 from mapspeak.ros.discovery.profile import PoseSource
 from mapspeak.ros.link import Patience
@@ -168,6 +170,16 @@ async def test_a_map_that_grows_and_moves_replaces_the_old_one() -> None:
         assert (await robot.fetch_map()).origin == Pose(-2.0, 1.0)
 
 
+async def test_a_map_that_cannot_be_one_is_told_the_same_as_long_as_it_is_the_latest() -> None:
+    scripted = ScriptedRobot()
+    good = scripted.map_message(grid_from_text(ROOM))
+    scripted.latched["/map"] = {**good, "info": {**good["info"], "width": 7}}
+    async with connected(scripted) as robot:
+        for _ in range(2):
+            with pytest.raises(MapError, match="says 7x"):
+                await robot.fetch_map()
+
+
 @pytest.mark.parametrize(("width", "height"), [(0, 0), (100_000, 100_000), (4, 4)])
 async def test_a_map_that_cannot_be_one_is_an_error_and_the_next_is_read(
     width: int, height: int
@@ -259,6 +271,27 @@ async def test_odometry_that_has_fallen_silent_is_not_told_as_the_present_pose()
         await robot.connection.call_service("/rosapi/get_time")
         with pytest.raises(LinkError, match="no odometry has come"):
             _ = poses.latest
+
+
+@pytest.mark.parametrize(("frame", "is_on_map"), [("map", True), ("", True), ("world", False)])
+async def test_a_localised_pose_counts_only_in_a_frame_that_leads_to_the_map(
+    frame: str, *, is_on_map: bool
+) -> None:
+    scripted = ScriptedRobot()
+    scripted.topics["/amcl_pose"] = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    scripted.latched = {
+        "/amcl_pose": {
+            "header": write_header(frame, 3.0, dialect=Dialect.ROS2),
+            "pose": {"pose": write_pose(Pose(1.0, 0.0))},
+        }
+    }
+    async with connected(scripted, patience=replace(LONG, frames_s=0.01)) as robot:
+        assert robot.profile.pose_topic == "/amcl_pose"
+        if is_on_map:
+            assert (await robot.fetch_pose()).pose == Pose(1.0, 0.0)
+            return
+        with pytest.raises(LinkError, match="frame 'world'"):
+            await robot.fetch_pose()
 
 
 async def test_transforms_that_are_none_are_left_away() -> None:
@@ -423,6 +456,64 @@ async def test_a_goal_that_replaces_another_does_not_wait_behind_it() -> None:
         await robot.send_goal(Pose(1.0, 1.0))
     assert scripted.goals[0][0] is not scripted.goals[1][0]
     assert len(scripted.server.visitors) == 2
+
+
+async def test_a_goal_goes_on_where_the_one_that_was_to_replace_it_is_refused() -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted) as robot, anyio.create_task_group() as tasks:
+        first = await robot.send_goal(GOAL)
+        scripted.accepts_goals = False
+
+        async def refuse() -> None:
+            await scripted.until(lambda: len(scripted.goals) == 2)
+            await scripted.end_goal(0, is_result=False)
+
+        tasks.start_soon(refuse)
+        second = await robot.send_goal(Pose(1.0, 1.0))
+        await until_state(robot, second, GoalState.REJECTED)
+        await scripted.end_goal(ABORTED, goal=0, error="no valid path found")
+        status = await until_state(robot, first, GoalState.BLOCKED)
+    assert quote_of(status) == "no valid path found"
+
+
+async def test_a_goal_whose_sender_gave_up_before_the_one_before_it_ended_does_not_drive_on() -> (
+    None
+):
+    scripted = ScriptedRobot()
+    async with connected(scripted, patience=replace(LONG, end_s=PATIENCE_S)) as robot:
+        await robot.send_goal(GOAL)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(robot.send_goal, Pose(1.0, 1.0))
+            await scripted.until(lambda: len(scripted.goals) == 2)
+            await robot.connection.call_service("/rosapi/get_time")
+            tasks.cancel_scope.cancel()
+        ours = scripted.goals[1][1]["id"]
+        await scripted.until(
+            lambda: ours in [each["id"] for each in scripted.server.asked("cancel_action_goal")]
+        )
+
+
+async def test_goals_are_given_in_the_frame_that_the_map_was_found_to_have_during_a_drive() -> None:
+    scripted = ScriptedRobot()
+    transforms = scripted.latched.pop("/tf")
+    scripted.topics["/odom"] = "nav_msgs/msg/Odometry"
+    odometry = {"pose": {"pose": write_pose(Pose(1.0, 0.0))}}
+    odometry["header"] = write_header("odom", 3.0, dialect=Dialect.ROS2)
+    scripted.latched["/odom"] = odometry
+    async with connected(scripted, patience=replace(LONG, frames_s=0.01)) as robot:
+        first = await robot.send_goal(GOAL)
+        prefixed = orjson.dumps(transforms).replace(b'"map"', b'"robot1/map"')
+        await scripted.publish("/tf", orjson.loads(prefixed))
+
+        async def is_found() -> bool:
+            return robot.profile.map_frame == "robot1/map"
+
+        await eventually(is_found)
+        await scripted.end_goal(SUCCEEDED)
+        await until_state(robot, first, GoalState.ARRIVED)
+        await robot.send_goal(GOAL)
+    header = scripted.goals[1][1]["args"]["pose"]["header"]
+    assert header["frame_id"] == "robot1/map"
 
 
 async def test_a_goal_that_another_client_has_sent_is_seen_until_it_ends() -> None:
@@ -608,6 +699,21 @@ async def test_a_stop_gets_past_a_service_that_is_stuck() -> None:
 
 async def ask_in_vain(robot: RosRobot) -> None:
     await robot.connection.call_service("/slow", timeout_s=PATIENCE_S)
+
+
+async def test_a_stop_ends_our_goals_though_the_robot_does_not_tell_what_it_offers() -> None:
+    scripted = ScriptedRobot(actions=())
+    patience = replace(LONG, answer_s=PATIENCE_S)
+    async with connected(scripted, patience=patience) as robot:
+        dock = open_action(
+            robot.connection, "/dock", dialect=Dialect.ROS2, type_name="a/action/Dock"
+        )
+        await dock.wait_until_taken(await dock.send({}, through=robot.connection))
+        scripted.services["/rosapi/topics"] = lambda _: None
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(robot.stop)
+            await scripted.until(lambda: scripted.server.asked("cancel_action_goal"))
+            tasks.cancel_scope.cancel()
 
 
 async def test_a_stop_that_navigation_refuses_is_an_error() -> None:
@@ -851,3 +957,16 @@ def subscriptions(scripted: ScriptedRobot, topic: str) -> list[Operation]:
 
 def called(scripted: ScriptedRobot, service: str) -> list[Operation]:
     return [each for each in scripted.server.asked("call_service") if each["service"] == service]
+
+
+async def test_a_topic_that_is_looked_at_now_and_then_is_heard_whole_by_who_asks_for_all() -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted) as robot:
+        robot.connection.subscribe("/scan", throttle_ms=100)
+        robot.connection.subscribe("/scan")
+        await scripted.until(lambda: len(subscriptions(scripted, "/scan")) == 2)
+        ended = [each["id"] for each in scripted.server.asked("unsubscribe")]
+    first, second = subscriptions(scripted, "/scan")
+    assert first["throttle_rate"] == 100
+    assert "throttle_rate" not in second
+    assert ended == [first["id"]]

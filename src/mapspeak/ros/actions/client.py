@@ -3,8 +3,8 @@
 import logging
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import contextmanager, suppress
 from functools import partial
 
 import anyio
@@ -182,20 +182,25 @@ class ActionClient(ABC):
 
     async def wait_until_taken(self, goal: ActionGoal) -> None:
         """Return when the server has taken or refused a goal; withdraw one that it does not."""
-        try:
+        with self.giving_up(goal):
             is_taken = await goal.wait_until(
                 lambda: goal.state is not ActionState.SENT, within_s=self._patience.acceptance_s
             )
+        if not is_taken:
+            reason = NOT_TAKEN.format(self._patience.acceptance_s)
+            self._withdraw(goal, ActionState.REJECTED, reason)
+
+    @contextmanager
+    def giving_up(self, goal: ActionGoal) -> Generator[None]:
+        """End a goal whose sender gives up waiting in the `with` block: nobody else knows of it."""
+        try:
+            yield
         except anyio.get_cancelled_exc_class():
-            # Only its sender knows of this goal: without him it would drive on.
             if goal.state is ActionState.SENT:
                 self._withdraw(goal, ActionState.CANCELLED, GIVEN_UP)
             elif not goal.is_over:
                 self._ask_to_cancel(goal)
             raise
-        if not is_taken:
-            reason = NOT_TAKEN.format(self._patience.acceptance_s)
-            self._withdraw(goal, ActionState.REJECTED, reason)
 
     async def cancel(self, goal: ActionGoal) -> None:
         """End one goal, and wait a moment for its end.

@@ -32,6 +32,7 @@ MAP_UPDATE = "map_msgs/OccupancyGridUpdate"
 MOVE_BASE_GOAL = "move_base_msgs/MoveBaseActionGoal"
 FRAMES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 BASE_FRAMES = ("base_footprint", "base_link")
+NAVIGATE = "/navigate_to_pose"
 
 
 Fields = dict[str, Any]
@@ -105,7 +106,7 @@ VELOCITIES = Wanted(
 
 
 USUAL_NAMES = {
-    NavigationKind.NAV2: "/navigate_to_pose",
+    NavigationKind.NAV2: NAVIGATE,
     NavigationKind.MOVE_BASE: "/move_base",
     NavigationKind.GOAL_TOPIC: "/goal_pose",
 }
@@ -168,6 +169,22 @@ def _choose_namespace(
     return "", () if "" in found else found
 
 
+def _find_other_robots(
+    graph: RosGraph, frames: frozenset[str], namespace: str
+) -> tuple[str, ...]:
+    """Return the beginnings of other robots' names, where one robot was chosen by its namespace.
+
+    A robot is known by its tree of frames, its base or its navigation.
+    """
+    named = [
+        *(topic for topic in graph.topics_of(*FRAMES) if topic.endswith("/tf")),
+        *(f"/{frame}" for frame in frames if frame.rpartition("/")[2] in BASE_FRAMES),
+        *(name for name in graph.actions if name.endswith(NAVIGATE)),
+    ]
+    found = {name.rpartition("/")[0] for name in named} - {"", namespace}
+    return tuple(f"{each}/" for each in found) if namespace else ()
+
+
 def _find_dead_action(graph: RosGraph, navigation: Fields) -> frozenset[str]:
     """Return an action that robot.yaml names and that has no server."""
     name = navigation["navigation_name"]
@@ -198,6 +215,7 @@ class _Choice:
         self._said = said
         self._frames = frames
         self._namespace = namespace
+        self._others = _find_other_robots(graph, frames, namespace)
         self._dead = dead
 
     def best(self, wanted: Wanted) -> str | None:
@@ -216,9 +234,10 @@ class _Choice:
         )
 
     def _first(self, names: Iterable[str]) -> str | None:
-        """Return the first of the names that lies in the namespace, else the first."""
+        """Return the first of the names that lies in the namespace, else of no other robot's."""
         listed = list(names)
-        return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
+        shared = (name for name in listed if not f"/{name.strip('/')}".startswith(self._others))
+        return next((name for name in listed if self._is_near(name)), next(shared, None))
 
     def _is_near(self, name: str) -> bool:
         prefix = self._namespace.strip("/")
@@ -298,7 +317,7 @@ class _Choice:
 
     def navigation(self, services: frozenset[str] | None) -> Fields:
         found = {
-            NavigationKind.NAV2: self._action("/navigate_to_pose"),
+            NavigationKind.NAV2: self._action(NAVIGATE),
             NavigationKind.MOVE_BASE: self._move_base(),
             NavigationKind.GOAL_TOPIC: self.best(GOALS),
         }
@@ -343,9 +362,9 @@ class _Choice:
         for name in names:
             if name in self._frames:
                 return name
-            prefixed = [frame for frame in sorted(self._frames) if frame.endswith(f"/{name}")]
-            if prefixed:
-                return str(self._first(prefixed)).lstrip("/")
+            prefixed = self._first(f for f in sorted(self._frames) if f.endswith(f"/{name}"))
+            if prefixed is not None:
+                return prefixed.lstrip("/")
         return names[-1]
 
 

@@ -98,7 +98,7 @@ class ActionDriver:
     """Sends poses to navigation and reads how its goals end.
 
     Args:
-        map_frame: In which goals are given.
+        map_frame: Tells in which frame goals are given.
         on_lost: Called when navigation has gone during a drive; the base is then not stopped.
     """
 
@@ -108,7 +108,7 @@ class ActionDriver:
         action: str,
         navigation: Navigation,
         *,
-        map_frame: str,
+        map_frame: Callable[[], str],
         now_s: Callable[[], float],
         on_lost: Callable[[], None],
     ) -> None:
@@ -137,7 +137,7 @@ class ActionDriver:
     async def send(self, goal: Pose) -> GoalRecord:
         """Send a goal, and wait until navigation has taken or refused it."""
         before = [(record, sent) for record, sent in self._drives if not record.is_over]
-        pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
+        pose = FramedPose(pose=goal, frame_id=self._map_frame(), stamp_s=LATEST_S)
         written = write_pose_stamped(pose, dialect=self._navigation.dialect)
         sent = await self._client.send(
             {self._navigation.pose_field: written}, through=self._connection
@@ -148,8 +148,12 @@ class ActionDriver:
             replaced.is_replaced = True
         await self._client.wait_until_taken(sent)
         self._consider(record, sent)
-        with anyio.move_on_after(self._patience.end_s):
-            for replaced, earlier in before:
+        if sent.state is ActionState.REJECTED:
+            for kept, _ in before:
+                kept.is_replaced = False
+            return record
+        with self._client.giving_up(sent), anyio.move_on_after(self._patience.end_s):
+            for _, earlier in before:
                 await earlier.wait_until_over(within_s=self._patience.end_s)
                 self._consider(replaced, earlier)
         return record
@@ -284,7 +288,7 @@ class GoalTopicDriver:
     """Publishes goals and judges their outcome by the robot's pose.
 
     Args:
-        map_frame: In which goals are given.
+        map_frame: Tells in which frame goals are given.
     """
 
     def __init__(
@@ -293,7 +297,7 @@ class GoalTopicDriver:
         topic: str,
         *,
         dialect: Dialect,
-        map_frame: str,
+        map_frame: Callable[[], str],
         fetch_pose: Callable[[], Awaitable[StampedPose]],
         now_s: Callable[[], float],
     ) -> None:
@@ -349,6 +353,8 @@ class GoalTopicDriver:
         elif stood_s > GIVEN_UP_S:
             code = CauseCode.STOOD_STILL
             cause = Cause(code=code, after_s=stood_s, distance_m=left_m)
+            # It must not drive on to the goal when that is told as over.
+            await self._publish(here)
             record.end(GoalState.BLOCKED, cause)
 
     async def cancel(self, record: GoalRecord) -> None:
@@ -365,7 +371,7 @@ class GoalTopicDriver:
         return await has_listeners(self._connection, self._topic)
 
     async def _publish(self, goal: Pose) -> None:
-        pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
+        pose = FramedPose(pose=goal, frame_id=self._map_frame(), stamp_s=LATEST_S)
         await self._connection.publish(self._topic, write_pose_stamped(pose, dialect=self._dialect))
 
     def _stood_for_s(self, here: Pose) -> float:

@@ -1,6 +1,5 @@
 """The robot's map: the whole of it once, then its updates."""
 
-from collections.abc import Mapping
 from contextlib import suppress
 
 import anyio.to_thread
@@ -9,7 +8,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.profile import RobotPart, RobotProfile
 from mapspeak.ros.discovery.topics import MAP, MAP_UPDATE
-from mapspeak.ros.messages.fields import Message, read_stamp
+from mapspeak.ros.messages.fields import Message, find_stamp
 from mapspeak.ros.messages.grids import apply_grid_update, read_grid
 from mapspeak.ros.port import LinkKind, RosConnection
 from mapspeak.spatial import OccupancyGrid
@@ -113,20 +112,16 @@ class MapSubscriber:
     @property
     def stamp_s(self) -> float | None:
         """Robot time of the latest map; None where there is none, or where it has no stamp."""
-        header = (self._maps.latest or {}).get("header") if self._maps else None
-        stamp = header.get("stamp") if isinstance(header, Mapping) else None
-        try:
-            return (read_stamp(stamp) or None) if isinstance(stamp, dict) else None
-        except LinkError:
-            return None
+        latest = None if self._maps is None else self._maps.latest
+        return None if latest is None else find_stamp(latest) or None
 
     def _read_latest(self, maps: Subscription) -> OccupancyGrid:
-        if maps.latest is not None and (self._grid is None or self._n_read != maps.n_received):
+        if maps.latest is None:
+            raise LinkError("The robot's map is gone.", hint=self._hint)
+        if self._grid is None or self._n_read != maps.n_received:
             self._grid = None
             self._n_read = maps.n_received
             self._grid = read_grid(maps.latest)
-        if self._grid is None:
-            raise LinkError("The robot's map is gone.", hint=self._hint)
         return self._grid
 
     def _take_update(self, message: Message) -> None:

@@ -43,6 +43,7 @@ USUAL_NAMES = {
 COSTMAPS = (NavigationPart.GLOBAL_COSTMAP, NavigationPart.LOCAL_COSTMAP)
 INSCRIBED = 99
 """The least cost at which the middle of the robot would make it collide (nav2_costmap_2d)."""
+THROTTLE_MS = 500
 FIRST_S = 1.0
 """Wall time for the first messages to come."""
 MOST_POINTS = 2_000
@@ -120,7 +121,9 @@ class NavigationListener:
         self._grids, self._heard = {}, {}
         for part, topic in self._topics.items():
             type_name = dialect.type_name(USUAL_NAMES[part][0])
-            heard = self._connection.subscribe(topic, type_name=type_name, throttle_ms=500)
+            # Of costmaps none is left out: parts that follow change the whole one before them.
+            throttle_ms = 0 if part in COSTMAPS else THROTTLE_MS
+            heard = self._connection.subscribe(topic, type_name=type_name, throttle_ms=throttle_ms)
             self._heard[part] = heard
             if part in COSTMAPS:
                 heard.listen(partial(self._forget_grid, part))

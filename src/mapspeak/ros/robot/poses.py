@@ -223,12 +223,18 @@ class PoseKeeper:
                 pose=outer_from_frame.pose @ framed.pose,
                 stamp_s=framed.stamp_s,
             )
-        if self._profile.pose_source is not PoseSource.ODOMETRY:
-            # Localisation speaks when the robot has moved: its silence says nothing.
-            return StampedPose(framed.pose, framed.stamp_s)
-        # Odometry without a map has no other frame: it is taken for the map's.
-        silent_s = self._measure_silence(topic.arrived_s, what="odometry")
-        return StampedPose(framed.pose, framed.stamp_s, silent_s=silent_s, is_odometry=True)
+        if self._profile.pose_source is PoseSource.ODOMETRY:
+            # Odometry without a map has no other frame: it is taken for the map's.
+            silent_s = self._measure_silence(topic.arrived_s, what="odometry")
+            return StampedPose(framed.pose, framed.stamp_s, silent_s=silent_s, is_odometry=True)
+        if not is_on_map:
+            raise LinkError(
+                f"The pose on {topic.topic} is in the frame {framed.frame_id[:80]!r}, and no "
+                f"transforms lead from there to the map's, {outer!r}.",
+                hint="Name another pose_topic or map_frame in robot.yaml, or publish the transform.",
+            )
+        # Localisation speaks when the robot has moved: its silence says nothing.
+        return StampedPose(framed.pose, framed.stamp_s)
 
     async def _wait_for_news(self) -> None:
         if self._topic is None:

@@ -5,6 +5,8 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
+import anyio
+
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import (
@@ -203,21 +205,27 @@ class RosRobot:
         """
         if not self.connection.is_open:
             await self.connection.wait_until_connected()
+        ends = [action.end for action in self.connection.started.actions.values()]
+        if self._driver is None:
+            ends.append(self._end_foreign_goals)
         try:
             self._brake.pull()
-            if self._driver is None:
-                # Others may have sent goals to a navigation that we have not found yet.
-                brake = self._brake
-                with suppress(LinkError):
-                    await self._watch.look()
-                if self._brake is not brake:
-                    self._brake.pull()
         finally:
-            await stop_everything(self.connection, brake=self._brake)
+            await stop_everything(self.connection, ends, velocities=lambda: self._brake.topics)
 
     async def settle(self) -> None:
         """Return when all that the robot offers counts as found."""
         await self._watch.settle()
+
+    async def _end_foreign_goals(self) -> bool:
+        """End goals that others have sent to a navigation which we have not found yet."""
+        brake = self._brake
+        with anyio.move_on_after(self.connection.patience.answer_s), suppress(LinkError):
+            await self._watch.look()
+        if self._brake is not brake:
+            self._brake.pull()
+        found = self.connection.started.actions.get(self.profile.navigation_name or "")
+        return False if found is None else await found.end()
 
     def _name_cameras(self) -> tuple[str, ...]:
         is_alive = RobotPart.CAMERA.is_alive(self.profile)
@@ -265,8 +273,7 @@ class RosRobot:
             self._poses = PoseKeeper(self.connection, now, self._frames)
         if is_new(RobotPart.VELOCITY):
             self._brake = self._build_brake()
-        is_elsewhere = now.map_frame != before.map_frame and not self._is_driving()
-        if is_new(RobotPart.NAVIGATION) or is_elsewhere:
+        if is_new(RobotPart.NAVIGATION):
             self._driver = self._build_driver()
         if now.clock_topic != before.clock_topic:
             self.connection.start_soon(partial(self._clock.start, now.clock_topic))
@@ -284,7 +291,7 @@ class RosRobot:
                     self.connection,
                     name,
                     NAV2 if profile.navigation is NavigationKind.NAV2 else MOVE_BASE,
-                    map_frame=profile.map_frame,
+                    map_frame=lambda: self.profile.map_frame,
                     now_s=lambda: self.now_s,
                     # Some bases keep the last velocity when their driver has gone.
                     on_lost=lambda: self._brake.pull(),  # noqa: PLW0108 - of then
@@ -294,7 +301,7 @@ class RosRobot:
                     self.connection,
                     name,
                     dialect=profile.dialect,
-                    map_frame=profile.map_frame,
+                    map_frame=lambda: self.profile.map_frame,
                     fetch_pose=self.fetch_pose,
                     now_s=lambda: self.now_s,
                 )

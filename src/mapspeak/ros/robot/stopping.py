@@ -1,6 +1,6 @@
 """The one way to stop: all that was started is ended, and zero velocity is sent until it stands."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from functools import partial
 
@@ -9,7 +9,6 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.geometry import wrap_angle
 from mapspeak.robot import StampedPose
-from mapspeak.ros.activity import Startable
 from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED, RobotProfile
 from mapspeak.ros.messages.fields import Message, write_header
 from mapspeak.ros.messages.poses import Twist, write_twist
@@ -133,40 +132,45 @@ def _has_moved(before: StampedPose, now: StampedPose) -> bool:
     return moved_m > STANDING_M or turned_rad > STANDING_RAD
 
 
-async def stop_everything(connection: RosConnection, *, brake: Brake) -> None:
-    """End all goals of ours, and every drive; the brake was pulled before.
+async def stop_everything(
+    connection: RosConnection,
+    ends: Iterable[Callable[[], Awaitable[bool]]],
+    *,
+    velocities: Callable[[], Iterable[str]],
+) -> None:
+    """End all that is under way at once; the brake was pulled before.
+
+    Args:
+        connection: The robot's.
+        ends: Each ends some goals, and returns whether anybody was told; it may raise `LinkError`.
+        velocities: Returns the topics for zero velocity.
 
     Raises:
         LinkError: Names all that could not be told, or goes on.
     """
     connection.started.n_stops += 1
     connection.clear_the_way()
-    actions = list(connection.started.actions.values())
     faults: list[LinkError] = []
     told: list[bool] = []
 
-    async def try_to_end(action: Startable) -> None:
+    async def attempt(end: Callable[[], Awaitable[bool]]) -> None:
         try:
-            told.append(await action.end())
+            told.append(await end())
         except LinkError as error:
             faults.append(error)
 
     async with anyio.create_task_group() as tasks:
-        for action in actions:
-            tasks.start_soon(try_to_end, action)
+        for end in ends:
+            tasks.start_soon(attempt, end)
     if faults:
         said = dict.fromkeys(fault.message for fault in faults)
         raise LinkError(" ".join(said), hint=faults[0].hint) from faults[0]
-    if not any(told) and not await _is_heard(connection, brake):
-        raise LinkError(
-            "Nobody could be told: no navigation is there, and nobody listens to velocities.",
-            hint="Check that the robot runs, and in the ROS system that this server is in.",
-        )
-
-
-async def _is_heard(connection: RosConnection, brake: Brake) -> bool:
-    """Return whether anybody listens to zero velocity."""
-    for topic in brake.topics:
+    if any(told):
+        return
+    for topic in velocities():
         if await has_listeners(connection, topic):
-            return True
-    return False
+            return
+    raise LinkError(
+        "Nobody could be told: no navigation is there, and nobody listens to velocities.",
+        hint="Check that the robot runs, and in the ROS system that this server is in.",
+    )
