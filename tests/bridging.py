@@ -28,10 +28,12 @@ class SteppedRobot(FakeRobot):
         self._fell_asleep = anyio.Event()
 
     async def sleep(self, duration_s: float) -> None:
-        until_s = self._now_s + duration_s
-        while self._now_s < until_s - 1e-6:
+        left_s = duration_s
+        while left_s > 1e-6:
+            before_s = self._now_s
             self._fell_asleep.set()
             await self._moved_on.wait()
+            left_s -= max(self._now_s - before_s, 0.0)
 
     async def let_pass(self, duration_s: float) -> None:
         """Lets time pass, and the server do at each step what is then due."""
@@ -41,6 +43,11 @@ class SteppedRobot(FakeRobot):
             self._moved_on, self._fell_asleep = anyio.Event(), anyio.Event()
             with anyio.fail_after(PATIENCE_S):
                 await self._fell_asleep.wait()
+
+
+    def set_back(self, by_s: float) -> None:
+        """Sets its clock back, as a simulation does that is begun anew."""
+        self._now_s -= by_s
 
 
 class RawClient:

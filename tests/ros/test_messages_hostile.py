@@ -32,6 +32,7 @@ from mapspeak.ros.messages.poses import (
 )
 from mapspeak.ros.messages.scans import (
     LaserScan,
+    read_cloud,
     read_fov_rad,
     read_scan,
     write_camera_info,
@@ -154,3 +155,40 @@ def test_a_mutated_frame_is_read_or_refused(data: st.DataObject) -> None:
         frame[data.draw(st.integers(0, len(frame) - 1))] = data.draw(st.integers(0, 255))
     with contextlib.suppress(FrameError):
         read_or_refuse(read_grid, decode_json(bytes(frame)))
+
+
+AXES = [
+    {"name": name, "datatype": 7, "offset": offset, "count": 1}
+    for name, offset in (("x", 0), ("y", 4), ("z", 8))
+]
+
+
+def cloud(**changed: Any) -> dict[str, Any]:  # noqa: ANN401 - ROS JSON
+    header = write_header("lidar", 1.0, dialect=Dialect.ROS2)
+    size = {"width": 1, "height": 1, "point_step": 12, "row_step": 12}
+    return {"header": header, **size, "fields": AXES, "data": bytes(12), **changed}
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"fields": 5},
+        {"fields": [{**AXES[0], "datatype": []}, *AXES[1:]]},
+        {"fields": [{**AXES[0], "offset": 2**70}, *AXES[1:]]},
+        {"fields": [{**AXES[0], "offset": True}, *AXES[1:]]},
+        {"fields": [{**AXES[0], "offset": -1}, *AXES[1:]]},
+        {"point_step": 0},
+        {"width": 2},
+        {"width": 2**31, "height": 2**31},
+    ],
+)
+def test_a_cloud_that_is_none_is_told_as_such(changed: dict[str, Any]) -> None:
+    with pytest.raises(LinkError):
+        read_cloud(cloud(**changed))
+
+
+@pytest.mark.parametrize("size", [(0, 0), (0, 2**31), (2**31, 0)])
+def test_a_cloud_without_points_is_read_at_once_whatever_its_sides(size: tuple[int, int]) -> None:
+    width, height = size
+    empty = cloud(width=width, height=height, row_step=0, data=b"")
+    assert read_cloud(empty).n_points == 0

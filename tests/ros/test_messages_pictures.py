@@ -158,6 +158,15 @@ def png_of(levels: NDArray[np.integer[Any]]) -> bytes:
     return encoded.tobytes()
 
 
+def test_of_several_pictures_in_one_file_the_first_passes() -> None:
+    encoded = io.BytesIO()
+    left, right = Image.new("RGB", (8, 6)), Image.new("RGB", (8, 6))
+    left.save(encoded, format="MPO", save_all=True, append_images=[right])
+    message = {"header": HEADER, "format": "jpeg", "data": encoded.getvalue()}
+    picture = read_compressed_image(message)
+    assert (picture.media_type, picture.width_px, picture.height_px) == ("image/jpeg", 8, 6)
+
+
 def test_compressed_depth_is_shaded_from_near_to_far() -> None:
     png = png_of(np.array([[0, 1000], [2500, 4000]], dtype=np.uint16))
     message = compressed("16UC1; compressedDepth png", struct.pack("<iff", 0, 0.0, 0.0) + png)

@@ -300,10 +300,80 @@ async def test_move_base_is_cancelled_by_id_or_altogether(goal_id: str) -> None:
         await client.all_before()
         await robot.let_pass(0.2)
         await client.send(op="publish", topic="/move_base/cancel", msg={"id": "other's"})
+        await client.all_before()
+        await robot.let_pass(0.2)
+        assert robot.ended == {}
         await client.send(op="publish", topic="/move_base/cancel", msg={"id": goal_id})
         result = await client.next_on("/move_base/result")
     assert (result["status"]["goal_id"]["id"], result["status"]["status"]) == ("one", 2)
     assert len(robot.ended) == 1
+
+
+@pytest.mark.parametrize(("second", "is_meant"), [(1, False), (3, True)])
+async def test_goals_are_cancelled_that_were_begun_up_to_a_time(
+    second: int, *, is_meant: bool
+) -> None:
+    """As actionlib's GoalID says it, and after it action_msgs/CancelGoal."""
+    async with bridge(Dialect.ROS1) as (robot, connect), connect() as client:
+        await robot.let_pass(2.0)
+        await publish_goal(client, "one")
+        await client.all_before()
+        message = {"id": "", "stamp": {"secs": second, "nsecs": 0}}
+        await client.send(op="publish", topic="/move_base/cancel", msg=message)
+        await client.all_before()
+        await robot.let_pass(0.2)
+        assert bool(robot.ended) == is_meant
+    async with bridge(Dialect.ROS2) as (robot, connect), connect() as client, connect() as urgent:
+        await robot.let_pass(2.0)
+        await watch(urgent)
+        await send_goal(client, "one")
+        await statuses(urgent, until=[EXECUTING])
+        info = {"stamp": {"sec": second, "nanosec": 0}}
+        answer = await urgent.call(f"{ACTION}/_action/cancel_goal", goal_info=info)
+        assert bool(answer["values"]["goals_canceling"]) == bool(robot.ended) == is_meant
+
+
+class Thoughtful(SteppedRobot):
+    """A robot that takes a goal only when a test lets it."""
+
+    def __init__(self) -> None:
+        super().__init__(two_rooms())
+        self.is_asked, self.may_take = anyio.Event(), anyio.Event()
+
+    async def send_goal(self, goal: Pose) -> str:
+        self.is_asked.set()
+        await self.may_take.wait()
+        return await super().send_goal(goal)
+
+
+@pytest.mark.parametrize("dialect", Dialect)
+async def test_a_goal_that_is_cancelled_while_the_robot_takes_it_is_ended(
+    dialect: Dialect,
+) -> None:
+    robot = Thoughtful()
+    async with (
+        bridge(dialect, robot) as (_, connect),
+        connect() as client,
+        connect() as urgent,
+        anyio.create_task_group() as tasks,
+    ):
+        if dialect is Dialect.ROS1:
+            await publish_goal(client, "one")
+            await robot.is_asked.wait()
+            await urgent.send(op="publish", topic="/move_base/cancel", msg={"id": "one"})
+            await urgent.all_before()
+        else:
+            await send_goal(client, "one")
+            await robot.is_asked.wait()
+            service = f"{ACTION}/_action/cancel_goal"
+            await urgent.send(op="call_service", id="cancel", service=service)
+            tasks.start_soon(urgent.until, lambda each: each.get("id") == "cancel")
+            # The server has read the call by the time it answers another client's.
+            async with connect() as third:
+                await third.ask("get_time")
+        robot.may_take.set()
+        await robot.let_pass(0.2)
+        assert robot.ended["fake-1"].state is GoalState.CANCELLED
 
 
 async def test_a_newer_goal_of_move_base_first_ends_the_one_before() -> None:

@@ -359,3 +359,15 @@ async def test_a_port_that_is_taken_is_an_error_with_a_hint() -> None:
                 SteppedRobot(), dialect=Dialect.ROS2, port=server.port
             ):
                 pass
+
+
+async def test_what_is_published_again_and_again_goes_on_when_the_clock_is_set_back() -> None:
+    async with bridge(Dialect.ROS1) as (robot, connect), connect() as client:
+        await robot.let_pass(50.0)
+        for topic in ("/move_base/status", "/amcl_pose"):
+            await client.send(op="subscribe", topic=topic)
+        await client.all_before()
+        robot.set_back(49.0)
+        await robot.let_pass(1.0)
+        came = await client.all_before()
+        assert {each["topic"] for each in came} >= {"/move_base/status", "/amcl_pose"}

@@ -7,6 +7,7 @@ five topics (actionlib), and to the simple goal of RViz.
 
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +20,7 @@ from mapspeak.ros.messages.fields import (
     Dialect,
     Message,
     bytes_of,
-    read_stamp,
+    find_stamp,
     write_header,
     write_stamp,
 )
@@ -100,6 +101,21 @@ class Drives:
     def wait_for_ever(self, *, goal_id: str | None = None) -> ServedDrive:
         """Take a goal that the robot cannot drive to, and stays silent about it, as move_base."""
         return self._note(goal_id, None, GoalStatus(state=GoalState.DRIVING))
+
+    async def find_meant(self, goal_id: str, until_s: float) -> list[ServedDrive]:
+        """Return the goals that a cancellation means, ended ones too.
+
+        They are, as actionlib's GoalID and action_msgs/CancelGoal have it, the one of an id and
+        those begun up to a time; all where it says neither. A goal that came before is waited for
+        while the robot takes it.
+        """
+        async with self._turn:
+            means_all = not goal_id and until_s == 0.0
+            return [
+                drive
+                for drive in self._drives
+                if means_all or drive.goal_id == goal_id or (until_s and drive.started_s <= until_s)
+            ]
 
     async def cancel(self, drive: ServedDrive) -> None:
         """End a goal, if it still goes on."""
@@ -224,17 +240,16 @@ class Nav2:
             drive.follow(feedback)
 
     async def cancel_goals(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Answer action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""
+        """Answer action_msgs/CancelGoal; an id of zeros names no goal (ROS 2 design)."""
         wanted = bytes_of(request["goal_info"]["goal_id"]["uuid"], "uuid")
-        chosen = self._drives.all
-        if any(wanted):
-            chosen = [drive for drive in chosen if uuid.UUID(drive.goal_id).bytes == wanted]
-            if not chosen:
-                return {"return_code": UNKNOWN_GOAL_ID, "goals_canceling": []}
+        goal_id = str(uuid.UUID(bytes=wanted)) if any(wanted) else ""
+        chosen = await self._drives.find_meant(goal_id, find_stamp(request["goal_info"]) or 0.0)
+        if goal_id and not chosen:
+            return {"return_code": UNKNOWN_GOAL_ID, "goals_canceling": []}
         going = [drive for drive in chosen if not drive.is_over.is_set()]
         for drive in going:
             await self._drives.cancel(drive)
-        code = GOAL_TERMINATED if any(wanted) and not going else 0
+        code = GOAL_TERMINATED if goal_id and not going else 0
         return {"return_code": code, "goals_canceling": [_goal_info(drive) for drive in going]}
 
     def _tell(self, _drive: ServedDrive) -> None:
@@ -312,14 +327,10 @@ class MoveBase:
 
     async def take_cancel(self, publication: Publication) -> None:
         """End one goal, all of them, or those up to a time, as actionlib's GoalID says."""
-        goal_id, until_s = publication.message["id"], _stamp_of(publication.message)
-        for drive in self._drives.all:
-            is_meant = drive.goal_id == goal_id or drive.started_s <= until_s
-            if is_meant or (not goal_id and until_s == 0.0):
-                try:
-                    await self._drives.cancel(drive)
-                except MapspeakError:
-                    continue
+        said = publication.message
+        for drive in await self._drives.find_meant(said["id"], find_stamp(said) or 0.0):
+            with suppress(MapspeakError):
+                await self._drives.cancel(drive)
 
     def publish_feedback(self, drive: ServedDrive, here: FramedPose) -> None:
         """Publish where the robot is on its way to a goal."""
@@ -374,10 +385,3 @@ def _entry_of(drive: ServedDrive) -> dict[str, Any]:
 def _entry(goal_id: str, stamp_s: float, code: int, text: str) -> dict[str, Any]:
     stamp = write_stamp(stamp_s, dialect=Dialect.ROS1)
     return {"goal_id": {"stamp": stamp, "id": goal_id}, "status": code, "text": text}
-
-
-def _stamp_of(message: Message) -> float:
-    try:
-        return read_stamp(message["stamp"])
-    except LinkError:
-        return 0.0

@@ -90,13 +90,27 @@ def face_cameras(description: RobotDescription) -> tuple[CameraFace, ...]:
 
 
 @dataclass(slots=True)
-class Source:
-    """Something published again and again, in robot time."""
+class Pace:
+    """The times of something that is done again and again, in robot time."""
 
-    produce: Callable[[], Awaitable[None]]
     period_s: float
-    due_s: float = 0.0
-    is_busy: bool = False
+    _last_s: float = -math.inf
+
+    def is_due(self, now_s: float) -> bool:
+        """Return True once in a period, and at once when the clock was set back."""
+        if self._last_s <= now_s < self._last_s + self.period_s:
+            return False
+        self._last_s = now_s
+        return True
+
+
+class Source:
+    """Something published again and again; it may take longer than its period."""
+
+    def __init__(self, produce: Callable[[], Awaitable[None]], period_s: float) -> None:
+        self.produce = produce
+        self.pace = Pace(period_s)
+        self.is_busy = False
 
 
 class Sources:
@@ -112,7 +126,7 @@ class Sources:
         self._grid: OccupancyGrid | None = None
         self._last: StampedPose | None = None
         self._estimate_topic = "/amcl_pose" if dialect is Dialect.ROS1 else "/pose"
-        self._estimate_due_s = 0.0
+        self._estimates = Pace(ESTIMATE_PERIOD_S)
         self._looked: set[str] = set()
         self._fixed: list[FrameTransform] = []
         self._slow = [Source(self._publish_map, MAP_PERIOD_S)]
@@ -144,8 +158,8 @@ class Sources:
         if any(map(self._hub.is_wanted, ("/tf", "/odom", self._estimate_topic))):
             await self._attempt(self._publish_pose)
         for source in self._slow:
-            if now_s >= source.due_s and not source.is_busy:
-                source.due_s, source.is_busy = now_s + source.period_s, True
+            if not source.is_busy and source.pace.is_due(now_s):
+                source.is_busy = True
                 tasks.start_soon(self._run_aside, source)
 
     async def _run_aside(self, source: Source) -> None:
@@ -249,8 +263,7 @@ class Sources:
         )
         self._hub.publish("/odom", odometry)
         self._last = here
-        if here.stamp_s >= self._estimate_due_s:
-            self._estimate_due_s = here.stamp_s + ESTIMATE_PERIOD_S
+        if self._estimates.is_due(here.stamp_s):
             in_map = FramedPose(pose=here.pose, frame_id="map", stamp_s=here.stamp_s)
             estimate = write_pose_with_covariance(in_map, dialect=self._dialect)
             self._hub.publish(self._estimate_topic, estimate)

@@ -30,6 +30,7 @@ from mapspeak.rosbridge_server.sources import (
     NAVIGATION_TOPICS,
     SCAN_TOPIC,
     TICK_S,
+    Pace,
     Sources,
     face_cameras,
 )
@@ -124,33 +125,25 @@ class RosStack(RosSystem):
 
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
-        hub: Carries the robot's topics; one is made of `topics_of` where none is given.
-        drives: Takes the goals; likewise.
         skilled: The robot where it has skills of its own.
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        *,
-        dialect: Dialect,
-        hub: Hub | None = None,
-        drives: Drives | None = None,
-        skilled: SkilledRobot | None = None,
+        self, robot: Robot, *, dialect: Dialect, skilled: SkilledRobot | None = None
     ) -> None:
         topics = topics_of(dialect, robot.description)
         skills = () if skilled is None else skilled.build_skills(robot)
         if skilled is not None:
             topics.append(_published(BATTERY_TOPIC, BATTERY_TYPE, NODE, depth=1))
         interfaces = Interfaces(dialect, more=types_of(skills))
-        super().__init__(hub or Hub(topics), interfaces, dialect=dialect)
+        super().__init__(Hub(topics), interfaces, dialect=dialect)
         offer_skills(self, skills)
-        self._drives = drives or Drives(robot)
+        self._drives = Drives(robot)
         self._robot = robot
         self._sources = Sources(robot, self.hub, dialect=dialect, skilled=skilled)
         self._navigation: Nav2 | MoveBase
         self._tasks: TaskGroup
-        self._feedback_due_s = self._status_due_s = 0.0
+        self._feedback, self._status = Pace(FEEDBACK_PERIOD_S), Pace(STATUS_PERIOD_S)
         self._take("/cmd_vel", self._take_velocity)
         parameters = parameters_of(dialect, radius_m=robot.description.radius_m)
         add_rosapi(self, parameters, lambda: robot.now_s)
@@ -179,12 +172,10 @@ class RosStack(RosSystem):
 
     async def _watch_drives(self) -> None:
         now_s = self._robot.now_s
-        if isinstance(self._navigation, MoveBase) and now_s >= self._status_due_s:
-            self._status_due_s = now_s + STATUS_PERIOD_S
+        if isinstance(self._navigation, MoveBase) and self._status.is_due(now_s):
             self._navigation.publish_status()
-        if not self._drives.under_way or now_s < self._feedback_due_s:
+        if not self._drives.under_way or not self._feedback.is_due(now_s):
             return
-        self._feedback_due_s = now_s + FEEDBACK_PERIOD_S
         try:
             await self._drives.look()
             here = await self._robot.fetch_pose()

@@ -101,6 +101,8 @@ def _identify(data: bytes, form: str) -> tuple[str, str, tuple[int, int]]:
     try:
         with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as picture:
             kind, mode, size = picture.format or "", picture.mode, picture.size
+            # A JPEG file of several pictures, of which every reader shows the first.
+            kind = "JPEG" if kind == "MPO" else kind
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise LinkError(
             f"The camera's compressed picture ({form[:40]!r}) is neither JPEG nor PNG.", hint=hint

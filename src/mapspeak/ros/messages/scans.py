@@ -16,6 +16,7 @@ from mapspeak.ros.messages.fields import (
     floats_of,
     misfit,
     number_of,
+    parts_of,
     read_header,
     whole_of,
     write_header,
@@ -226,7 +227,7 @@ def read_cloud(message: Message) -> PointCloud:
         whole_of(message, key, low=0, high=2**31)
         for key in ("width", "height", "point_step", "row_step")
     )
-    fields = [field for field in message.get("fields") or [] if isinstance(field, dict)]
+    fields = [field for field in parts_of(message, "fields") if isinstance(field, dict)]
     kind = _point_kind(fields, point_step, is_bigendian=bool(message.get("is_bigendian")))
     data = np.frombuffer(bytes_of(message.get("data")), dtype=np.uint8)
     row_step = row_step or width * point_step
@@ -236,11 +237,12 @@ def read_cloud(message: Message) -> PointCloud:
         raise LinkError(
             f"A cloud of {width} x {height} points brings {data.size} bytes only.", hint=HINT
         )
-    rows = [
-        data[row * row_step : row * row_step + width * point_step].view(kind)
-        for row in range(height)
-    ]
-    packed = np.concatenate(rows) if rows else np.zeros(0, dtype=kind)
+    if width * height == 0:
+        row_step = height = 0
+    # The last row may come without its padding.
+    rows = np.zeros(height * row_step, dtype=np.uint8)
+    rows[: data.size] = data[: rows.size]
+    packed = rows.reshape(height, row_step)[:, : width * point_step].copy().view(kind).ravel()
     points = np.stack([packed[axis].astype(np.float64) for axis in "xyz"], axis=1)
     return PointCloud(
         points=points[np.isfinite(points).all(axis=1)],
@@ -261,9 +263,10 @@ def _point_kind(
     offsets: list[int] = []
     for axis in "xyz":
         code, offset = found[axis].get("datatype"), found[axis].get("offset")
-        if code not in KINDS or not isinstance(offset, int):
+        kind = KINDS.get(code) if isinstance(code, int) else None
+        if kind is None or type(offset) is not int or not 0 <= offset < point_step:
             raise LinkError(f"The cloud's field {axis} is of no known type.", hint=HINT)
-        formats.append(f"{order}{KINDS[code]}")
+        formats.append(f"{order}{kind}")
         offsets.append(offset)
     try:
         return np.dtype(

@@ -45,8 +45,6 @@ class IdleSubscriptions:
         self._subscribe = subscribe
         self._n_looking = 0
         self._looked_s = 0.0
-        self._is_open = anyio.Event()
-        connection.start_soon(self._close_when_idle)
 
     @contextmanager
     def look(self) -> Generator[tuple[Subscription, ...]]:
@@ -54,23 +52,23 @@ class IdleSubscriptions:
         self._n_looking += 1
         try:
             if not self.subscriptions:
-                self._looked_s = anyio.current_time()
                 self.subscriptions = self._subscribe()
-                self._is_open.set()
+                self._connection.start_soon(self._close_when_idle)
             yield self.subscriptions
         finally:
             self._n_looking -= 1
             self._looked_s = anyio.current_time()
 
     async def _close_when_idle(self) -> None:
-        while True:
-            await self._is_open.wait()
-            await anyio.sleep_until(self._looked_s + LINGER_S)
-            if self._n_looking == 0 and anyio.current_time() >= self._looked_s + LINGER_S:
-                for subscription in self.subscriptions:
-                    self._connection.unsubscribe(subscription)
-                self.subscriptions = ()
-                self._is_open = anyio.Event()
+        while (idle_s := self._measure_idle()) < LINGER_S:
+            await anyio.sleep(LINGER_S - idle_s)
+        for subscription in self.subscriptions:
+            self._connection.unsubscribe(subscription)
+        self.subscriptions = ()
+
+    def _measure_idle(self) -> float:
+        """Return for how long nobody has looked."""
+        return 0.0 if self._n_looking else anyio.current_time() - self._looked_s
 
 
 LONGEST_PATIENCE_S = 30.0
