@@ -44,7 +44,6 @@ class SteppedRobot(FakeRobot):
             with anyio.fail_after(PATIENCE_S):
                 await self._fell_asleep.wait()
 
-
     def set_back(self, by_s: float) -> None:
         """Sets its clock back, as a simulation does that is begun anew."""
         self._now_s -= by_s

@@ -69,6 +69,11 @@ class Pose:
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return Point(self.x + cos * point.x - sin * point.y, self.y + sin * point.x + cos * point.y)
 
+    def is_near(self, other: "Pose", *, off_m: float, turn_rad: float) -> bool:
+        """Return True when the other is no farther away and turned by no more than that."""
+        turned_rad = abs(wrap_angle(other.yaw_rad - self.yaw_rad))
+        return self.point.distance_to(other.point) <= off_m and turned_rad <= turn_rad
+
     def is_finite(self) -> bool:
         """Return True when no coordinate is NaN or infinite."""
         return all(math.isfinite(value) for value in (self.x, self.y, self.yaw_rad))

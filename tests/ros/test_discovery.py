@@ -209,7 +209,7 @@ def test_of_several_robots_the_one_of_the_namespace_is_taken() -> None:
 
 def test_what_the_chosen_robot_lacks_is_not_taken_from_another_one() -> None:
     types = {
-        **{topic: name for topic, name in in_namespaces("alpha").items()},
+        **in_namespaces("alpha"),
         "/beta/tf": "tf2_msgs/TFMessage",
         "/map": GRID,
         "/camera/image_raw": "sensor_msgs/Image",

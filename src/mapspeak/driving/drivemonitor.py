@@ -9,7 +9,7 @@ import anyio
 
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.geometry import Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
 from mapspeak.safety import NOBODY, calling
 
@@ -177,7 +177,8 @@ class DriveMonitor:
 
     def _judge_progress(self, status: GoalStatus) -> GoalStatus | None:
         at, now_s = self._moved_at, self._robot.now_s
-        if at is None or _has_moved(at, self.here) or now_s < self._moved_s:
+        stands = at is not None and at.is_near(self.here, off_m=MOVED_M, turn_rad=TURNED_RAD)
+        if not stands or now_s < self._moved_s:
             self._moved_at, self._moved_s = self.here, now_s
         still_s = now_s - self._moved_s
         if still_s < self._patience_s:
@@ -210,11 +211,6 @@ class DriveMonitor:
             # A simulation that is begun anew sets its clock back.
             elapsed_s=max(until_s - drive.started_s, 0.0),
         )
-
-
-def _has_moved(one: Pose, other: Pose) -> bool:
-    turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
-    return one.point.distance_to(other.point) > MOVED_M or turned_rad > TURNED_RAD
 
 
 class OwedStop:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.geometry import Pose
 from mapspeak.memory.quoting import clean_line
 from mapspeak.places.goalcheck import GoalCheck
 
@@ -167,7 +167,5 @@ def _in_brackets(text: str) -> str:
 def is_same(one: Command, other: Command) -> bool:
     """Return True when what was approved of one holds for the other."""
     if isinstance(one, DriveCommand) and isinstance(other, DriveCommand):
-        turned_rad = wrap_angle(one.goal.yaw_rad - other.goal.yaw_rad)
-        is_near = one.goal.point.distance_to(other.goal.point) <= SAME_GOAL_M
-        return is_near and abs(turned_rad) <= SAME_GOAL_RAD
+        return one.goal.is_near(other.goal, off_m=SAME_GOAL_M, turn_rad=SAME_GOAL_RAD)
     return one == other

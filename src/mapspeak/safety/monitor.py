@@ -207,8 +207,7 @@ class StandingCheck:
             return False
         if before is None:
             return is_first
-        turned_rad = wrap_angle(here.yaw_rad - before.yaw_rad)
-        return before.point.distance_to(here.point) <= WAVER_M and abs(turned_rad) <= WAVER_RAD
+        return before.is_near(here, off_m=WAVER_M, turn_rad=WAVER_RAD)
 
     async def _look(self) -> Pose | None:
         with anyio.move_on_after(LOOK_S):

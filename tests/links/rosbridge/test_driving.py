@@ -286,6 +286,16 @@ async def test_a_robot_that_only_takes_poses_is_stopped_by_its_own_pose() -> Non
     assert (here["x"], here["y"]) == (1.0, 2.0)
 
 
+async def test_a_robot_that_only_takes_poses_is_stopped_also_where_its_pose_is_not_known() -> None:
+    scripted = goal_topic_robot()
+    async with connected(scripted, patience=replace(LONG, pose_silence_s=-1.0)) as robot:
+        await robot.stop()
+        await scripted.until(lambda: published(scripted, "/goal_pose"))
+    (here,) = [each["msg"] for each in published(scripted, "/goal_pose")]
+    assert here["header"]["frame_id"] == "base_footprint"
+    assert here["pose"]["position"] == {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
 async def test_a_robot_without_navigation_says_so() -> None:
     async with connected(ScriptedRobot(actions=())) as robot:
         with pytest.raises(LinkError, match="no navigation") as raised:

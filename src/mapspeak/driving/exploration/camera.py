@@ -115,11 +115,7 @@ def find_camera_target(
 
 def _is_taken(pose: Pose, views: Sequence[CameraView]) -> bool:
     """Return True where a picture was taken already: it would be taken again without end."""
-    return any(
-        view.pose.point.distance_to(pose.point) <= SAME_SPOT_M
-        and abs(wrap_angle(view.pose.yaw_rad - pose.yaw_rad)) <= SAME_WAY_RAD
-        for view in views
-    )
+    return any(view.pose.is_near(pose, off_m=SAME_SPOT_M, turn_rad=SAME_WAY_RAD) for view in views)
 
 
 def measure_pictured_on(world: WorldModel, views: Sequence[CameraView]) -> float:

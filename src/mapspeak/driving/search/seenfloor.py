@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
 from mapspeak.spatial.grid import IntArray, Mask
@@ -17,11 +17,6 @@ LOOKED_NEAR_M = 0.4
 LOOKED_RAD = math.radians(15)
 SAME_PLACE_M = 0.1
 SAME_HEADING_RAD = math.radians(2)
-
-
-def _is_like(one: Pose, other: Pose, near_m: float, turn_rad: float) -> bool:
-    is_near = one.point.distance_to(other.point) <= near_m
-    return is_near and abs(wrap_angle(one.yaw_rad - other.yaw_rad)) <= turn_rad
 
 
 class SeenFloor:
@@ -45,7 +40,9 @@ class SeenFloor:
         """Note a look by the camera's pose and opening; one like an earlier one adds nothing."""
         half_rad = self._half_view(fov_rad)
         known = (each for each, _ in self._views)
-        if not any(_is_like(pose, each, SAME_PLACE_M, SAME_HEADING_RAD) for each in known):
+        if not any(
+            pose.is_near(each, off_m=SAME_PLACE_M, turn_rad=SAME_HEADING_RAD) for each in known
+        ):
             self._views.append((pose, half_rad))
 
     def _half_view(self, fov_rad: float | None) -> float:
@@ -64,7 +61,9 @@ class SeenFloor:
 
     def has_look_from(self, pose: Pose) -> bool:
         """Return True if the caller was shown a picture from this pose."""
-        return any(_is_like(look, pose, LOOKED_NEAR_M, LOOKED_RAD) for look in self._looks)
+        return any(
+            look.is_near(pose, off_m=LOOKED_NEAR_M, turn_rad=LOOKED_RAD) for look in self._looks
+        )
 
     def add_look(self, pose: Pose, fov_rad: float | None) -> None:
         """Note a picture that the caller was shown."""

@@ -91,8 +91,7 @@ def choose_view(world: WorldModel, words: str, half_view_rad: float) -> CheckedG
 
 def is_there(robot: Pose, pose: Pose) -> bool:
     """Return True for a robot that stands in a pose, as nearly as navigation brings it there."""
-    is_near = robot.point.distance_to(pose.point) <= THERE_M
-    return is_near and abs(wrap_angle(robot.yaw_rad - pose.yaw_rad)) <= THERE_RAD
+    return robot.is_near(pose, off_m=THERE_M, turn_rad=THERE_RAD)
 
 
 def find_viewpoint(world: WorldModel, place: Place, half_view_rad: float) -> Pose | None:

@@ -169,9 +169,7 @@ def _choose_namespace(
     return "", () if "" in found else found
 
 
-def _find_other_robots(
-    graph: RosGraph, frames: frozenset[str], namespace: str
-) -> tuple[str, ...]:
+def _find_other_robots(graph: RosGraph, frames: frozenset[str], namespace: str) -> tuple[str, ...]:
     """Return the beginnings of other robots' names, where one robot was chosen by its namespace.
 
     A robot is known by its tree of frames, its base or its navigation.

@@ -14,6 +14,7 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, StampedPose
 from mapspeak.ros.actions import open_action
 from mapspeak.ros.activity import ActionGoal, ActionState
+from mapspeak.ros.discovery.profile import POSE_STAMPED, RobotProfile
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.ros.port import RosConnection, has_listeners, new_id
@@ -288,7 +289,7 @@ class GoalTopicDriver:
     """Publishes goals and judges their outcome by the robot's pose.
 
     Args:
-        map_frame: Tells in which frame goals are given.
+        profile: Returns the robot's interfaces, as far as they have been found.
     """
 
     def __init__(
@@ -296,21 +297,19 @@ class GoalTopicDriver:
         connection: RosConnection,
         topic: str,
         *,
-        dialect: Dialect,
-        map_frame: Callable[[], str],
+        profile: Callable[[], RobotProfile],
         fetch_pose: Callable[[], Awaitable[StampedPose]],
         now_s: Callable[[], float],
     ) -> None:
         self._connection = connection
         self._topic = topic
-        self._dialect = dialect
-        self._map_frame = map_frame
+        self._profile = profile
         self._fetch_pose = fetch_pose
         self._now_s = now_s
         self._current: GoalRecord | None = None
         self._moved: tuple[Pose, float] | None = None
         """The last pose in motion, and its time."""
-        connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
+        connection.advertise(topic, type_name=profile().dialect.type_name(POSE_STAMPED))
         connection.started.actions[topic] = self
 
     @property
@@ -331,7 +330,7 @@ class GoalTopicDriver:
         """Publish a goal, without confirmation."""
         record = GoalRecord(goal)
         self._connection.started.n_begun += 1
-        await self._publish(goal)
+        await self._publish(goal, self._profile().map_frame)
         if self._current is not None:
             self._current.end(GoalState.PREEMPTED, Cause(code=CauseCode.REPLACED))
         self._current = record
@@ -354,33 +353,40 @@ class GoalTopicDriver:
             code = CauseCode.STOOD_STILL
             cause = Cause(code=code, after_s=stood_s, distance_m=left_m)
             # It must not drive on to the goal when that is told as over.
-            await self._publish(here)
+            await self._call_off()
             record.end(GoalState.BLOCKED, cause)
 
     async def cancel(self, record: GoalRecord) -> None:
         """Send the robot to where it is; it has no other way to end a goal."""
         if not record.is_over and record is self._current:
-            await self._publish((await self._fetch_pose()).pose)
+            await self._call_off()
             record.end(GoalState.CANCELLED)
 
     async def end(self) -> bool:
         """Send the robot to where it is; return whether anybody listens to goals."""
-        await self._publish((await self._fetch_pose()).pose)
+        await self._call_off()
         if self._current is not None:
             self._current.end(GoalState.CANCELLED)
         return await has_listeners(self._connection, self._topic)
 
-    async def _publish(self, goal: Pose) -> None:
-        pose = FramedPose(pose=goal, frame_id=self._map_frame(), stamp_s=LATEST_S)
-        await self._connection.publish(self._topic, write_pose_stamped(pose, dialect=self._dialect))
+    async def _call_off(self) -> None:
+        """Send the robot to where it is, by its own frame where its pose is not known."""
+        profile = self._profile()
+        try:
+            await self._publish((await self._fetch_pose()).pose, profile.map_frame)
+        except LinkError:
+            await self._publish(Pose(0.0, 0.0), profile.base_frame)
+
+    async def _publish(self, goal: Pose, frame_id: str) -> None:
+        framed = FramedPose(pose=goal, frame_id=frame_id, stamp_s=LATEST_S)
+        message = write_pose_stamped(framed, dialect=self._profile().dialect)
+        await self._connection.publish(self._topic, message)
 
     def _stood_for_s(self, here: Pose) -> float:
         now_s = self._now_s()
-        if self._moved is None or _has_moved(self._moved[0], here):
-            self._moved = (here, now_s)
-        return max(now_s - self._moved[1], 0.0)
-
-
-def _has_moved(before: Pose, now: Pose) -> bool:
-    turned_rad = abs(wrap_angle(now.yaw_rad - before.yaw_rad))
-    return now.point.distance_to(before.point) > STANDING_M or turned_rad > STANDING_RAD
+        before, since_s = self._moved or (here, now_s)
+        stands = before.is_near(here, off_m=STANDING_M, turn_rad=STANDING_RAD)
+        # A clock that was set back has not run backwards.
+        if self._moved is None or not stands or now_s < since_s:
+            self._moved = before, since_s = here, now_s
+        return now_s - since_s

@@ -231,7 +231,7 @@ class PoseKeeper:
             raise LinkError(
                 f"The pose on {topic.topic} is in the frame {framed.frame_id[:80]!r}, and no "
                 f"transforms lead from there to the map's, {outer!r}.",
-                hint="Name another pose_topic or map_frame in robot.yaml, or publish the transform.",
+                hint="Name another pose_topic or map_frame in robot.yaml, or publish transforms.",
             )
         # Localisation speaks when the robot has moved: its silence says nothing.
         return StampedPose(framed.pose, framed.stamp_s)

@@ -300,8 +300,7 @@ class RosRobot:
                 return GoalTopicDriver(
                     self.connection,
                     name,
-                    dialect=profile.dialect,
-                    map_frame=lambda: self.profile.map_frame,
+                    profile=lambda: self.profile,
                     fetch_pose=self.fetch_pose,
                     now_s=lambda: self.now_s,
                 )

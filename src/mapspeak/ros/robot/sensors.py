@@ -60,7 +60,7 @@ class IdleSubscriptions:
             self._looked_s = anyio.current_time()
 
     async def _close_when_idle(self) -> None:
-        while (idle_s := self._measure_idle()) < LINGER_S:
+        while (idle_s := self._measure_idle()) < LINGER_S:  # noqa: ASYNC110 - until a known time
             await anyio.sleep(LINGER_S - idle_s)
         for subscription in self.subscriptions:
             self._connection.unsubscribe(subscription)

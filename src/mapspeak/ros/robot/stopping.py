@@ -7,7 +7,6 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.geometry import wrap_angle
 from mapspeak.robot import StampedPose
 from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED, RobotProfile
 from mapspeak.ros.messages.fields import Message, write_header
@@ -119,17 +118,15 @@ class _Standing:
         is_new = stamped.stamp_s != self._latest_s
         self._latest_s = stamped.stamp_s
         since = self._since
-        if since is None or _has_moved(since, stamped) or stamped.stamp_s < since.stamp_s:
+        if (
+            since is None
+            or stamped.stamp_s < since.stamp_s
+            or not since.pose.is_near(stamped.pose, off_m=STANDING_M, turn_rad=STANDING_RAD)
+        ):
             self._since = stamped
         else:
             self.is_so = stamped.stamp_s - since.stamp_s >= STANDING_S
         return is_new
-
-
-def _has_moved(before: StampedPose, now: StampedPose) -> bool:
-    turned_rad = abs(wrap_angle(now.pose.yaw_rad - before.pose.yaw_rad))
-    moved_m = now.pose.point.distance_to(before.pose.point)
-    return moved_m > STANDING_M or turned_rad > STANDING_RAD
 
 
 async def stop_everything(

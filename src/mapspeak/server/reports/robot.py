@@ -8,7 +8,6 @@ from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
@@ -131,9 +130,7 @@ def _distance_left_m(report: DriveReport) -> float | None:
 def _stands_at_goal(report: DriveReport) -> bool:
     if report.status.state is not GoalState.ARRIVED:
         return False
-    goal, pose = report.drive.goal, report.pose
-    turned_rad = abs(wrap_angle(pose.yaw_rad - goal.yaw_rad))
-    return pose.point.distance_to(goal.point) <= AT_GOAL_M and turned_rad <= AT_HEADING_RAD
+    return report.pose.is_near(report.drive.goal, off_m=AT_GOAL_M, turn_rad=AT_HEADING_RAD)
 
 
 def _say_next_step(report: DriveReport) -> str:

@@ -96,10 +96,10 @@ class Annotator:
     def find_picture_from(self, pose: Pose) -> TakenPicture | None:
         """Return the picture that was taken last, if it shows what is seen from a pose."""
         latest = self.pictures.latest
-        if latest is None or latest.pose.point.distance_to(pose.point) > SAME_SPOT_M:
+        if latest is None:
             return None
-        turn_rad = abs(wrap_angle(latest.pose.yaw_rad - pose.yaw_rad))
-        return latest if turn_rad <= SAME_VIEW_RAD else None
+        is_same = latest.pose.is_near(pose, off_m=SAME_SPOT_M, turn_rad=SAME_VIEW_RAD)
+        return latest if is_same else None
 
     def wants_laser(
         self, *given: Landmarks | None, pose: Pose, picture: TakenPicture | None

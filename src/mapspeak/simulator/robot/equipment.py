@@ -84,9 +84,7 @@ class Equipment:
         """Return the dock whose contacts the robot touches."""
         here = self._body.world_from_base
         for dock in self._of_kind(DOCK):
-            pose = _pose_at(dock)
-            is_turned = abs(wrap_angle(pose.yaw_rad - here.yaw_rad)) <= CONTACT_RAD
-            if is_turned and pose.point.distance_to(here.point) <= CONTACT_M:
+            if _pose_at(dock).is_near(here, off_m=CONTACT_M, turn_rad=CONTACT_RAD):
                 return dock
         return None
 
