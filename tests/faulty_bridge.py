@@ -137,15 +137,12 @@ class FaultyStack(RosStack):
             self._faulty.restart_navigation()
 
     def jump_to(self, now_s: float) -> None:
-        """Set the clock, with which all that was due at a time is due anew."""
+        """Set the clock."""
         self._faulty.jump_to(now_s)
-        self._feedback_due_s = self._status_due_s = self._sources._estimate_due_s = 0.0
-        for source in self._sources._slow:
-            source.due_s = 0.0
 
     async def _watch_drives(self) -> None:
         if not self._faulty.faults.feeds_back:
-            self._feedback_due_s = self._faulty.now_s + 1.0
+            self._feedback.is_due(self._faulty.now_s)
         if self._faulty.is_navigation_alive:
             await super()._watch_drives()
 

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import anyio
 import anyio.to_thread
@@ -35,7 +35,7 @@ from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
 from mapspeak.ros.port import RosConnection, started_over
-from mapspeak.safety import Guard, GuardedRobot, MapReviser, WhenBusy, guard_connection
+from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, MapReviser, WhenBusy
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel, revise
@@ -99,13 +99,15 @@ class Session:
             self._guarded = GuardedRobot(robot, guard=guard, reviser=self._reviser)
             when_busy = guard.policy.when_busy
             if ros is not None:
-                ros = guard_connection(
+                guarded = GuardedConnection(
                     ros,
                     guard=guard,
                     now_s=lambda: robot.now_s,
                     teleop=self._guarded.teleop,
                     planner=self._guarded.planner,
                 )
+                # Its other members are passed on by name.
+                ros = cast("RosConnection", guarded)
         self.ros, self.skilled = ros, skilled
         self.robot: Robot = self._guarded or robot
         name_robot, lock = lambda: robot.description.name, threading.RLock()

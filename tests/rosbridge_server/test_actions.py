@@ -8,9 +8,9 @@ import pytest
 
 from bridging import RawClient, SteppedRobot, bridge
 from fakes import FakeRobot, two_rooms
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, LinkError
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState
+from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.rosbridge_server.hub import Hub, Publication
@@ -440,6 +440,39 @@ async def test_a_goal_whose_client_goes_while_the_robot_takes_it_can_be_cancelle
         robot.give_up = scope.cancel
         await drives.start(AHEAD)
     (drive,) = drives.under_way
+    await drives.cancel(drive)
+    assert robot.ended["fake-1"].state is GoalState.CANCELLED
+
+
+class Unheard(SteppedRobot):
+    """A robot that cannot be reached now and then."""
+
+    is_away = False
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        self._answer()
+        return await super().fetch_goal_status(robot_goal_id)
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        self._answer()
+        await super().cancel_goal(robot_goal_id)
+
+    def _answer(self) -> None:
+        if self.is_away:
+            raise LinkError("There is no connection.", hint="Wait.")
+
+
+async def test_a_goal_of_a_robot_that_cannot_be_reached_for_a_while_can_be_cancelled() -> None:
+    robot = Unheard(two_rooms())
+    drives = Drives(robot)
+    robot.is_away = True
+    drive = await drives.start(AHEAD)
+    with pytest.raises(LinkError):
+        await drives.cancel(drive)
+    await drives.look()
+    assert not drive.is_cancelling
+    assert drives.under_way == [drive]
+    robot.is_away = False
     await drives.cancel(drive)
     assert robot.ended["fake-1"].state is GoalState.CANCELLED
 

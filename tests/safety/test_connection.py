@@ -10,7 +10,14 @@ from guarding import audit_of, make_guard
 from mapspeak.errors import LinkError, PolicyError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.port import RosConnection
-from mapspeak.safety import Approval, CommandKind, GuardedConnection, Policy
+from mapspeak.safety import (
+    Approval,
+    CommandKind,
+    GuardedConnection,
+    GuardedRobot,
+    MapReviser,
+    Policy,
+)
 from mapspeak.safety.connection import HARMLESS
 from mapspeak.session import Session
 
@@ -66,7 +73,15 @@ class FakeRos:
 
 def guarded(ros: FakeRos, folder: Path, policy: Policy | None = None) -> GuardedConnection:
     guard = make_guard(folder, policy)
-    connection = GuardedConnection(ros, guard=guard, now_s=lambda: 1.0)  # type: ignore[arg-type]
+    reviser = MapReviser((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(FakeRobot(two_rooms()), guard=guard, reviser=reviser)
+    connection = GuardedConnection(
+        ros,  # type: ignore[arg-type]
+        guard=guard,
+        now_s=lambda: 1.0,
+        teleop=robot.teleop,
+        planner=robot.planner,
+    )
     connection.advertise("/cmd_vel", type_name="geometry_msgs/msg/Twist")
     return connection
 

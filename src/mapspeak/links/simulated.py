@@ -111,7 +111,7 @@ class SimulatedRobot:
 
     async def fetch_map(self) -> OccupancyGrid:
         """Return the map that the simulated SLAM publishes."""
-        return await self._run(self._simulation.map)
+        return await self.compute(self._simulation.map)
 
     async def fetch_pose(self) -> StampedPose:
         """Return the pose that the simulated SLAM believes in."""
@@ -179,15 +179,15 @@ class SimulatedRobot:
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """End a drive."""
-        await self._run(lambda: self._simulation.cancel_goal(_number(robot_goal_id)))
+        await self.compute(lambda: self._simulation.cancel_goal(_number(robot_goal_id)))
 
     async def stop(self) -> None:
         """End every drive and commands zero velocity."""
-        await self._run(self._simulation.stop)
+        await self.compute(self._simulation.stop)
 
     async def advance_to(self, until_s: float) -> None:
         """Compute the world up to that robot time."""
-        await self._run(lambda: self._advance_to(until_s))
+        await self.compute(lambda: self._advance_to(until_s))
 
     async def fetch_battery(self) -> float | None:
         """Return how full its battery is, from 0 to 1."""
@@ -195,9 +195,6 @@ class SimulatedRobot:
 
     async def compute(self, work: Callable[[], T]) -> T:
         """Work on the simulation while no other call does."""
-        return await self._run(work)
-
-    async def _run(self, work: Callable[[], T]) -> T:
         async with self._turn:
             return await anyio.to_thread.run_sync(work)
 
@@ -252,7 +249,8 @@ class SoloRobot(SimulatedRobot):
     loop.
     """
 
-    async def _run(self, work: Callable[[], T]) -> T:
+    async def compute(self, work: Callable[[], T]) -> T:
+        """Work on the simulation while no other call does."""
         async with self._turn:
             return work()
 

@@ -92,7 +92,8 @@ class Drives:
             with anyio.CancelScope(shield=True):
                 robot_goal_id = await self._robot.send_goal(goal)
                 await self._look_at_all()
-                status = await self._robot.fetch_goal_status(robot_goal_id)
+                begun = GoalStatus(state=GoalState.ACCEPTED)
+                status = await self._fetch_status(robot_goal_id, begun)
             if status.state is GoalState.REJECTED:
                 said = "" if status.cause is None else status.cause.quote
                 raise GoalError(f"Goal rejected: {said}", hint="Choose another.")
@@ -121,11 +122,15 @@ class Drives:
         """End a goal, if it still goes on."""
         if drive.is_over.is_set():
             return
-        drive.is_cancelling = True
         if drive.robot_goal_id is None:
             self._renew(drive, GoalStatus(state=GoalState.CANCELLED))
             return
-        await self._robot.cancel_goal(drive.robot_goal_id)
+        drive.is_cancelling = True
+        try:
+            await self._robot.cancel_goal(drive.robot_goal_id)
+        except MapspeakError:
+            drive.is_cancelling = False
+            raise
         await self.look()
 
     async def look(self) -> None:
@@ -136,14 +141,18 @@ class Drives:
 
     async def _look_at_all(self) -> None:
         for drive in self.under_way:
-            if drive.robot_goal_id is None:
-                continue
-            try:
-                status = await self._robot.fetch_goal_status(drive.robot_goal_id)
-            except MapspeakError as error:
-                cause = Cause(code=CauseCode.REFUSED, quote=error.message)
-                status = GoalStatus(state=GoalState.LOST, cause=cause)
-            self._renew(drive, status)
+            if drive.robot_goal_id is not None:
+                self._renew(drive, await self._fetch_status(drive.robot_goal_id, drive.status))
+
+    async def _fetch_status(self, robot_goal_id: str, before: GoalStatus) -> GoalStatus:
+        """Return how a goal stands; as before while the robot cannot be reached."""
+        try:
+            return await self._robot.fetch_goal_status(robot_goal_id)
+        except LinkError:
+            return before
+        except MapspeakError as error:
+            cause = Cause(code=CauseCode.REFUSED, quote=error.message)
+            return GoalStatus(state=GoalState.LOST, cause=cause)
 
     def _renew(self, drive: ServedDrive, status: GoalStatus) -> None:
         drive.status = status

@@ -125,20 +125,28 @@ class RosStack(RosSystem):
 
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
+        hub: Carries the robot's topics; one is made of `topics_of` where none is given.
+        drives: Takes the goals; likewise.
         skilled: The robot where it has skills of its own.
     """
 
     def __init__(
-        self, robot: Robot, *, dialect: Dialect, skilled: SkilledRobot | None = None
+        self,
+        robot: Robot,
+        *,
+        dialect: Dialect,
+        hub: Hub | None = None,
+        drives: Drives | None = None,
+        skilled: SkilledRobot | None = None,
     ) -> None:
         topics = topics_of(dialect, robot.description)
         skills = () if skilled is None else skilled.build_skills(robot)
         if skilled is not None:
             topics.append(_published(BATTERY_TOPIC, BATTERY_TYPE, NODE, depth=1))
         interfaces = Interfaces(dialect, more=types_of(skills))
-        super().__init__(Hub(topics), interfaces, dialect=dialect)
+        super().__init__(hub or Hub(topics), interfaces, dialect=dialect)
         offer_skills(self, skills)
-        self._drives = Drives(robot)
+        self._drives = drives or Drives(robot)
         self._robot = robot
         self._sources = Sources(robot, self.hub, dialect=dialect, skilled=skilled)
         self._navigation: Nav2 | MoveBase

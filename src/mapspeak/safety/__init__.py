@@ -28,7 +28,7 @@ from mapspeak.safety.commands import (
     SetParameter,
     say_command,
 )
-from mapspeak.safety.connection import GuardedConnection, guard_connection
+from mapspeak.safety.connection import GuardedConnection
 from mapspeak.safety.deciding import (
     Allowed,
     Decision,
@@ -93,7 +93,6 @@ __all__ = [
     "covered_by",
     "current_caller",
     "decide",
-    "guard_connection",
     "load_policy",
     "publishing_for",
     "read_audit",

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal
@@ -47,8 +47,8 @@ class GuardedConnection:
     """A `RosConnection` that changes only what its policy allows; stopping always passes.
 
     Args:
-        teleop: Knows where velocities would take the robot; None where nothing is closed.
-        planner: Checks the poses of goals against the map; None for no check.
+        teleop: Knows where velocities would take the robot.
+        planner: Checks the poses of goals against the map.
     """
 
     def __init__(
@@ -57,8 +57,8 @@ class GuardedConnection:
         *,
         guard: Guard,
         now_s: Callable[[], float],
-        teleop: Teleop | None = None,
-        planner: Planner | None = None,
+        teleop: Teleop,
+        planner: Planner,
     ) -> None:
         self._planner = planner
         self._connection = connection
@@ -84,7 +84,7 @@ class GuardedConnection:
         if goal is not None:
             await self._send(goal, self._connection.publish(topic, message))
             return
-        objection = await self._teleop.find_objection(message) if self._teleop else None
+        objection = await self._teleop.find_objection(message)
         await self._guarded(command, self._connection.publish(topic, message), objection)
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
@@ -147,7 +147,7 @@ class GuardedConnection:
         objection = None
         try:
             # What is denied anyway needs no look at the map.
-            if self._planner is not None and not is_name_denied(command, self._guard.policy):
+            if not is_name_denied(command, self._guard.policy):
                 objection = await self._planner.judge_message(command.goal)
         except BaseException:
             work.close()
@@ -185,8 +185,7 @@ class GuardedConnection:
 
     def _objection_unseen(self, command: Publish) -> Refused | None:
         """Return the objection to a velocity when there is no time to fetch the pose."""
-        is_free = self._teleop is None or not self._teleop.knows_areas
-        if is_free or not any(find_speeds(command.message)):
+        if not self._teleop.knows_areas or not any(find_speeds(command.message)):
             return None
         return refuse_velocity("A velocity goes out by all ways at once only when it is zero.")
 
@@ -200,7 +199,7 @@ class GuardedConnection:
             work.close()
             raise
         # From before it is sent: what fails half-way may move the robot all the same.
-        if self._teleop and isinstance(command, Publish) and _is_velocity(command.type):
+        if isinstance(command, Publish) and _is_velocity(command.type):
             self._teleop.begin(command.topic)
         said = "given up"
         try:
@@ -211,7 +210,7 @@ class GuardedConnection:
         return result
 
     def _note_stop(self, command: Publish | Call) -> None:
-        if self._teleop is not None and isinstance(command, Publish):
+        if isinstance(command, Publish):
             self._teleop.end(command.topic)
         name = command.service if isinstance(command, Call) else command.topic
         said = f"zero velocity, or the end of a goal, on {name}"
@@ -242,21 +241,6 @@ class GuardedConnection:
         if name not in HARMLESS:
             raise AttributeError(name)
         return getattr(self._connection, name)
-
-
-def guard_connection(
-    connection: RosConnection,
-    *,
-    guard: Guard,
-    now_s: Callable[[], float],
-    teleop: Teleop,
-    planner: Planner,
-) -> RosConnection:
-    """Return a connection behind the guard, whose other members are passed on by name."""
-    guarded = GuardedConnection(
-        connection, guard=guard, now_s=now_s, teleop=teleop, planner=planner
-    )
-    return cast("RosConnection", guarded)
 
 
 def _is_stop(command: Publish | Call) -> bool:

@@ -27,12 +27,11 @@ from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wa
 from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
 from mapspeak.ros.activity import Subscription
 from mapspeak.ros.link import Patience, plain_errors
-from mapspeak.ros.messages.fields import bare_type, check_name
+from mapspeak.ros.messages.fields import NANOSECONDS, bare_type, check_name
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection, keep_open
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""
-NANOSECONDS = 1_000_000_000
 QUIET_S = 0.3
 """Without anything new, after which all that is there counts as found."""
 WATCH_S = 0.2

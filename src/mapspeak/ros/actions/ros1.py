@@ -7,7 +7,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.ros.actions.client import GONE, RESULT_LATE, SILENT, ActionClient
 from mapspeak.ros.activity import ActionGoal, ActionState
-from mapspeak.ros.messages.fields import Dialect, Message, write_header, write_stamp
+from mapspeak.ros.messages.fields import LATEST_S, Dialect, Message, write_header, write_stamp
 from mapspeak.ros.port import RosConnection, has_listeners, new_id
 
 CANCEL_TYPE, STATUS_TYPE = "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatusArray"
@@ -24,7 +24,7 @@ STATES = {
     9: ActionState.LOST,
 }
 """actionlib_msgs/GoalStatus."""
-NOW = write_stamp(0.0, dialect=Dialect.ROS1)
+NOW = write_stamp(LATEST_S, dialect=Dialect.ROS1)
 
 
 class Ros1ActionClient(ActionClient):
@@ -68,7 +68,7 @@ class Ros1ActionClient(ActionClient):
         # Known before it is sent: the answer may come while it is still being sent.
         self._keep(goal, through)
         message = {
-            "header": write_header("", 0.0, dialect=Dialect.ROS1),
+            "header": write_header("", LATEST_S, dialect=Dialect.ROS1),
             "goal_id": {"stamp": NOW, "id": goal_id},
             "goal": arguments,
         }

@@ -170,6 +170,8 @@ def check_type(name: str) -> None:
         )
 
 
+LATEST_S = 0.0
+"""A stamp that ROS takes for "as it is now"; our idea of robot time may be off."""
 NANOSECONDS = 1_000_000_000
 LARGEST_SECONDS = 2**32 - 1
 

@@ -6,13 +6,11 @@ from enum import IntEnum
 from typing import Any
 
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages.fields import Dialect, write_header
+from mapspeak.ros.messages.fields import LATEST_S, Dialect, write_header
 from mapspeak.ros.messages.poses import write_pose
 
 MARKER_ARRAY = "visualization_msgs/MarkerArray"
 ADD, DELETE_ALL = 0, 3
-LATEST_S = 0.0
-"""A stamp that RViz takes for "any time": things on a map stay where they are."""
 ORIGIN = Pose(0.0, 0.0)
 
 
@@ -61,6 +59,7 @@ class Marker:
 
 def write_markers(marks: Sequence[Marker], *, frame_id: str, dialect: Dialect) -> dict[str, Any]:
     """Write visualization_msgs/MarkerArray, in place of all that was drawn before."""
+    # Things on a map stay where they are.
     header = write_header(frame_id, LATEST_S, dialect=dialect)
     erase = {"header": header, "ns": "", "id": 0, "type": 0, "action": DELETE_ALL}
     written = (_write(mark, number, header) for number, mark in enumerate(marks, start=1))

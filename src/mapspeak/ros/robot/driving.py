@@ -15,7 +15,7 @@ from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, StampedPose
 from mapspeak.ros.actions import open_action
 from mapspeak.ros.activity import ActionGoal, ActionState
 from mapspeak.ros.discovery.profile import POSE_STAMPED, RobotProfile
-from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.ros.messages.fields import LATEST_S, Dialect, Message
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.ros.port import RosConnection, has_listeners, new_id
 
@@ -62,9 +62,6 @@ class GoalRecord:
         left_m = 0.0 if state is GoalState.ARRIVED else self.status.distance_left_m
         self.status = replace(self.status, state=state, cause=cause, distance_left_m=left_m)
 
-
-LATEST_S = 0.0
-"""A stamp that ROS takes for "as it is now"; our idea of robot time may be off."""
 
 STATE_OF = {
     ActionState.SUCCEEDED: GoalState.ARRIVED,

@@ -9,10 +9,9 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.robot import StampedPose
 from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED, RobotProfile
-from mapspeak.ros.messages.fields import Message, write_header
+from mapspeak.ros.messages.fields import LATEST_S, Message, write_header
 from mapspeak.ros.messages.poses import Twist, write_twist
 from mapspeak.ros.port import RosConnection, has_listeners
-from mapspeak.ros.robot.driving import LATEST_S
 
 PAUSE_S = 0.05
 N_AT_LEAST = 2
