@@ -34,7 +34,8 @@ from mapspeak.memory.events import Event
 from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
-from mapspeak.ros.port import RosConnection, started_over
+from mapspeak.ros.activity import Started
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, MapReviser, WhenBusy
 from mapspeak.skill import SkilledRobot
 from mapspeak.spatial import OccupancyGrid
@@ -134,14 +135,19 @@ class Session:
         self.drives.dismiss(cause, owner=client)
         drive = self.drives.under_way
         is_drivers = self.drives.is_busy and (drive is None or drive.caller.owner == client)
-        if is_drivers or client in started_over(self.ros).owners:
+        if is_drivers or client in self._started.owners:
             logger.warning("The client hung up during its drive: stopping the robot.")
             await self.drives.stop(cause)
 
     @property
+    def _started(self) -> Started:
+        """What was started over ROS: nothing without it."""
+        return Started() if self.ros is None else self.ros.started
+
+    @property
     def _is_busy(self) -> bool:
         """True while something goes on that was started here."""
-        return self.drives.is_busy or started_over(self.ros).is_busy
+        return self.drives.is_busy or self._started.is_busy
 
     async def compute(self, work: Callable[[], T]) -> T:
         """Do heavy work in a thread, so that a stop is answered meanwhile."""

@@ -174,6 +174,13 @@ def test_of_several_robots_none_is_chosen_silently() -> None:
     assert choose(in_namespaces("a", "b")).other_namespaces == ("/a", "/b")
 
 
+def test_of_several_robots_none_is_mixed_with_another_where_none_was_chosen() -> None:
+    profile = choose(in_namespaces("a", "b"), actions=("/b/navigate_to_pose",))
+    assert profile.navigation_name == "/a/goal_pose"
+    used = (profile.map_topic, profile.scan_topic, profile.velocity_topic, *profile.tf_topics)
+    assert all(topic is not None and topic.startswith("/a/") for topic in used)
+
+
 def test_a_goal_topic_serves_where_there_is_no_action() -> None:
     profile = choose({"/goal_pose": "geometry_msgs/PoseStamped"})
     assert profile.navigation is NavigationKind.GOAL_TOPIC

@@ -345,14 +345,6 @@ async def keep_open(connection: Connection) -> AsyncGenerator[Connection]:
                 tasks.cancel_scope.cancel()
 
 
-def started_over(connection: RosConnection | None) -> Started:
-    """Return everything started over a connection; nothing without a connection."""
-    try:
-        return Started() if connection is None else connection.started
-    except LinkError:
-        return Started()
-
-
 async def has_listeners(connection: RosConnection, topic: str) -> bool:
     """Return whether anybody listens to a topic; True where the robot does not say."""
     try:

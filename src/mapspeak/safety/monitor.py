@@ -1,7 +1,7 @@
 """Monitors: closed areas ahead of a moving robot, its goal, and whether a held robot stands."""
 
 import math
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable
 from enum import StrEnum
 
 import anyio
@@ -136,15 +136,13 @@ class KeepOutMonitor:
         return follow_arc(here.point, heading_rad, turned_rad / moved_m, further_m, n_steps=N_STEPS)
 
 
-def find_entered(
-    areas: Sequence[ClosedArea], here: Point, way: Sequence[Point], *, radius_m: float
-) -> ClosedArea | None:
-    """Find the area that a robot would come too near to on a way; it may always drive away."""
-    for area in areas:
-        least_m = min(radius_m + KEEP_M, area.distance_to_border(here) - WAVER_M)
-        if any(area.distance_to_border(each) < least_m for each in way):
-            return area
-    return None
+def comes_too_near(area: ClosedArea, here: Point, way: Iterable[Point], *, reach_m: float) -> bool:
+    """Return True for a way from here that comes nearer to an area than `reach_m`.
+
+    A robot that is too near already may drive along the area or away from it.
+    """
+    least_m = min(reach_m, area.distance_to_border(here) - WAVER_M)
+    return any(area.distance_to_border(each) < least_m for each in way)
 
 
 def _find_turn(then: Pose, here: Pose) -> float:

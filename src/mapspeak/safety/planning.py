@@ -14,7 +14,7 @@ from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
 from mapspeak.robot import GoalStatus, Robot, StampedPose
 from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, read_number, refuse
 from mapspeak.safety.guard import MapReviser, Permit
-from mapspeak.safety.monitor import KEEP_M, GoalMonitor
+from mapspeak.safety.monitor import KEEP_M, GoalMonitor, comes_too_near
 from mapspeak.safety.policy import Policy
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, find_path
@@ -28,8 +28,6 @@ SHORTEST_M = 0.5
 BOW_M = 1.0
 """A leg farther than this from all areas needs no second check: no robot strays that far."""
 AROUND_M = 2.0
-LEAVING_M = 0.01
-"""A robot already too near may come nearer by this much: the noise of its pose."""
 
 
 def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...]:
@@ -128,13 +126,10 @@ def _crop_around(grid: OccupancyGrid, ends: tuple[Point, Point]) -> OccupancyGri
 
 def _is_clear(points: Sequence[Point], areas: Sequence[ClosedArea], reach_m: float) -> bool:
     """Return True when a way keeps off all areas, or leads away from one that is too near."""
-    steps = Path.through(tuple(points)).sampled(STEP_M)[1:]
-    for area in areas:
-        least_m = min(area.distance_to_border(points[0]) - LEAVING_M, reach_m)
-        along = (area.distance_to_border(each) for each in steps)
-        if area.contains(points[0]) or any(off_m < least_m for off_m in along):
-            return False
-    return True
+    here, steps = points[0], Path.through(tuple(points)).sampled(STEP_M)[1:]
+    return not any(
+        area.contains(here) or comes_too_near(area, here, steps, reach_m=reach_m) for area in areas
+    )
 
 
 def _between(start: Point, end: Point, share: float) -> Point:

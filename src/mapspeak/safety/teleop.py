@@ -14,7 +14,13 @@ from mapspeak.robot import Robot
 from mapspeak.ros.messages.poses import Twist
 from mapspeak.safety.deciding import Refused, find_speeds, refuse
 from mapspeak.safety.guard import MapReviser
-from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered, follow_arc
+from mapspeak.safety.monitor import (
+    BRAKING_MPS2,
+    KEEP_M,
+    REACTION_S,
+    comes_too_near,
+    follow_arc,
+)
 from mapspeak.safety.planning import Planner
 
 LEAST_S = 0.5
@@ -102,7 +108,9 @@ class Teleop:
             entered = next((each for each in areas if each.distance_to(here.point) < reach_m), None)
         else:
             way = _predict(here, velocity, lasts_s)
-            entered = find_entered(areas, here.point, way, radius_m=radius_m)
+            near_m = radius_m + KEEP_M
+            near = (each for each in areas if comes_too_near(each, here.point, way, reach_m=near_m))
+            entered = next(near, None)
         if entered is None:
             return None
         off_m = max(entered.distance_to(here.point) - radius_m, 0.0)

@@ -112,3 +112,16 @@ async def test_a_call_that_cannot_be_is_an_error(
     ):
         with pytest.raises(LinkError, match=message):
             await connection.call_service(service, arguments, type_name=type_name)
+
+
+async def test_a_node_that_does_not_answer_keeps_the_others_from_telling_the_time_but_once() -> (
+    None
+):
+    service, types = "get_parameter_types", "rcl_interfaces/srv/GetParameterTypes"
+    async with open_both() as (node, connection):
+        node.serve(f"/a/{service}", types, lambda _request, _reply: None)
+        node.serve(f"/b/{service}", types, lambda _request, reply: reply({"types": b""}))
+        await until(lambda: len(connection.discovery.services) == 2)
+        told = [await connection.fetch_time_s() for _ in range(3)]
+    assert told[0] is None
+    assert None not in told[1:]

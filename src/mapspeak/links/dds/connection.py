@@ -88,6 +88,7 @@ class DdsConnection(NativeLink):
             self._participant.key, on_change=self._note_change, framing_of=framing_of
         )
         self._services: dict[str, DdsService] = {}
+        self._n_mute = 0
         self._learned = WeakSet[Subscription]()
         """Those of whose type the robot was asked already."""
 
@@ -261,9 +262,12 @@ class DdsConnection(NativeLink):
         servers = sorted(each for each in self.discovery.services if each.endswith(ASKED_FOR_TIME))
         if not servers:
             return None
+        asked = servers[self._n_mute % len(servers)]
         try:
-            return (await self._call(servers[0], {"names": []}, timeout_s=TIME_S)).source_s
+            return (await self._call(asked, {"names": []}, timeout_s=TIME_S)).source_s
         except LinkError:
+            # The node may be stuck: another one is asked the next time.
+            self._n_mute += 1
             return None
 
     async def fetch_nodes(self) -> tuple[str, ...]:

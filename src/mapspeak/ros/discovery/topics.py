@@ -126,7 +126,9 @@ def choose_profile(
     Topics known to exist by name only are `dead`; `services` are None where they are not known.
     """
     namespace, others = _choose_namespace(overrides, find_namespaces(graph, dead))
-    choice = _Choice(graph, overrides, frames, namespace=namespace, dead=dead)
+    # Where none was chosen, at least none is mixed with another.
+    own = next(iter(others), namespace)
+    choice = _Choice(graph, overrides, frames, namespace=own, dead=dead)
     navigation = choice.navigation(services)
     return RobotProfile(
         name=overrides.name or namespace.strip("/") or "robot",
