@@ -403,6 +403,20 @@ async def test_move_base_never_ends_a_goal_in_a_frame_it_does_not_know() -> None
     assert robot.goals == {}
 
 
+async def test_a_newer_goal_ends_one_in_a_frame_that_move_base_does_not_know() -> None:
+    async with bridge(Dialect.ROS1) as (robot, connect), connect() as client:
+        await listen(client, "result", "status")
+        for goal_id in ("one", "two"):
+            await publish_goal(client, goal_id, frame_id="atlantis")
+            await client.all_before()
+        await publish_goal(client, "three")
+        await client.all_before()
+        await robot.let_pass(0.3)
+        status = [each for each in await client.all_before() if each["topic"].endswith("status")]
+    stand = [each["status"] for each in status[-1]["msg"]["status_list"]]
+    assert stand == [2, 2, 1]
+
+
 async def test_move_base_refuses_a_quaternion_of_zeros() -> None:
     async with bridge(Dialect.ROS1) as (robot, connect), connect() as client:
         await listen(client, "result")

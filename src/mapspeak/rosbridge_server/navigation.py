@@ -164,6 +164,9 @@ class Drives:
     def _note(
         self, goal_id: str | None, robot_goal_id: str | None, status: GoalStatus
     ) -> ServedDrive:
+        for waiting in self.under_way:
+            if waiting.robot_goal_id is None:
+                self._renew(waiting, GoalStatus(state=GoalState.PREEMPTED))
         drive = ServedDrive(
             goal_id=goal_id or str(uuid.uuid4()),
             robot_goal_id=robot_goal_id,
