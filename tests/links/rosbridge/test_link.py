@@ -800,6 +800,19 @@ async def test_topics_are_subscribed_to_with_their_types_so_that_they_may_appear
     assert None not in types.values()
 
 
+async def test_a_robot_that_does_not_tell_who_publishes_is_not_asked_for_every_topic() -> None:
+    scripted = ScriptedRobot()
+    for topic in ("/scan", "/camera/image_raw", "/left/image_raw", "/right/image_raw"):
+        kind = "LaserScan" if topic == "/scan" else "Image"
+        scripted.topics[topic] = f"sensor_msgs/msg/{kind}"
+    scripted.services["/rosapi/publishers"] = lambda _: None
+    async with connected(scripted, patience=replace(LONG, answer_s=0.1)) as robot:
+        assert robot.profile.map_topic == "/map"
+        n_asked = len(called(scripted, "/rosapi/publishers"))
+        n_looks = len(called(scripted, "/rosapi/topics"))
+    assert n_asked <= 2 * n_looks
+
+
 async def test_without_rosapi_robot_yaml_is_enough() -> None:
     scripted = ScriptedRobot()
     scripted.services.clear()

@@ -121,6 +121,8 @@ def _plausible(value: object) -> float | None:
 
 MOST_ROUNDS = 8
 """Most rounds of checking that the best topics are served, and else choosing the next best."""
+ANSWERS = 2
+"""How many answers that do not come are waited for while the topics are asked for."""
 RADIUS_S = 3.0
 """Longest wait for navigation to tell the radius, in wall time: a hanging one must not block."""
 
@@ -159,19 +161,24 @@ async def _choose_alive(
     """Return the best of the served interfaces, then of those that exist by name."""
     liveness = Liveness(connection)
     trees = find_namespaces(graph, frozenset())
-    for namespace in trees if len(trees) > 1 else ():
-        await liveness.ask(f"{namespace}/tf", is_heard=False)
-    for _ in range(MOST_ROUNDS):
-        before = liveness.dead
-        profile = choose_profile(graph, overrides, frames=frames, dead=before, services=services)
-        for part in RobotPart if graph.types else ():
-            topic = part.topic(profile)
-            if topic is not None and part is not RobotPart.RADIUS and topic not in graph.actions:
+    # A robot that does not tell must not be waited for once for each topic.
+    with anyio.move_on_after(ANSWERS * connection.patience.answer_s):
+        for namespace in trees if len(trees) > 1 else ():
+            await liveness.ask(f"{namespace}/tf", is_heard=False)
+        for _ in range(MOST_ROUNDS if graph.types else 0):
+            before = liveness.dead
+            profile = choose_profile(
+                graph, overrides, frames=frames, dead=before, services=services
+            )
+            for part in RobotPart:
+                topic = part.topic(profile)
+                if topic is None or part is RobotPart.RADIUS or topic in graph.actions:
+                    continue
                 await liveness.ask(topic, is_heard=part.is_heard(profile))
-        for camera in profile.cameras[1:] if graph.types else ():
-            await liveness.ask(camera.topic, is_heard=False)
-        if liveness.dead == before:
-            break
+            for camera in profile.cameras[1:]:
+                await liveness.ask(camera.topic, is_heard=False)
+            if liveness.dead == before:
+                break
     profile = choose_profile(graph, overrides, frames=frames, dead=liveness.dead, services=services)
     used = {part.topic(profile) for part in RobotPart}
     return replace(profile, dead_topics=frozenset(profile.dead_topics & used))
