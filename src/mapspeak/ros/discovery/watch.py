@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Container
 from contextlib import suppress
 from dataclasses import replace
 
@@ -48,6 +48,15 @@ class Liveness:
             return
         if not [node for node in found if not (is_own and node.endswith(f"/{own.node}"))]:
             self.dead |= {topic}
+
+    async def ask_for_parts(self, profile: RobotProfile, *, actions: Container[str]) -> None:
+        """Find it out about the topics of a profile; actions are served where they are listed."""
+        for part in RobotPart:
+            topic = part.topic(profile)
+            if topic is not None and part is not RobotPart.RADIUS and topic not in actions:
+                await self.ask(topic, is_heard=part.is_heard(profile))
+        for camera in profile.cameras[1:]:
+            await self.ask(camera.topic, is_heard=False)
 
 
 async def _ask(question: Awaitable[tuple[str, ...]]) -> tuple[str, ...] | None:
@@ -170,13 +179,7 @@ async def _choose_alive(
             profile = choose_profile(
                 graph, overrides, frames=frames, dead=before, services=services
             )
-            for part in RobotPart:
-                topic = part.topic(profile)
-                if topic is None or part is RobotPart.RADIUS or topic in graph.actions:
-                    continue
-                await liveness.ask(topic, is_heard=part.is_heard(profile))
-            for camera in profile.cameras[1:]:
-                await liveness.ask(camera.topic, is_heard=False)
+            await liveness.ask_for_parts(profile, actions=graph.actions)
             if liveness.dead == before:
                 break
     profile = choose_profile(graph, overrides, frames=frames, dead=liveness.dead, services=services)
