@@ -307,6 +307,22 @@ async def test_transforms_that_are_none_are_left_away() -> None:
         await eventually(has_moved)
 
 
+async def test_a_transform_that_is_none_costs_none_of_those_beside_it() -> None:
+    """As in tf2: the driver of one joint may err, and its publisher sends all joints at once."""
+    scripted = ScriptedRobot()
+    async with connected(scripted) as robot:
+        message = scripted.transforms(Pose(5.0, 5.0))
+        rotation = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
+        transform = {"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": rotation}
+        broken = {**message["transforms"][0], "child_frame_id": "wheel", "transform": transform}
+        await scripted.publish("/tf", {"transforms": [broken, *message["transforms"]]})
+
+        async def has_moved() -> bool:
+            return (await robot.fetch_pose()).pose.x == 5.0
+
+        await eventually(has_moved)
+
+
 # --- the camera
 
 

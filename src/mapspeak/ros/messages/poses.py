@@ -128,8 +128,17 @@ def write_odometry(
 
 
 def read_transforms(message: Message) -> tuple[FrameTransform, ...]:
-    """Read tf2_msgs/TFMessage."""
-    return tuple(_read_transform(each) for each in parts_of(message, "transforms"))
+    """Read tf2_msgs/TFMessage; one that is none is left out beside others, as tf2 does."""
+    found: list[FrameTransform] = []
+    fault: LinkError | None = None
+    for each in parts_of(message, "transforms"):
+        try:
+            found.append(_read_transform(each))
+        except LinkError as error:
+            fault = error
+    if fault is not None and not found:
+        raise fault
+    return tuple(found)
 
 
 def write_transforms(transforms: Iterable[FrameTransform], *, dialect: Dialect) -> dict[str, Any]:
