@@ -200,8 +200,6 @@ class FrameListener:
         self.tree = TransformTree()
         self.arrived_s: float | None = None
         """When something new was told of one that moves, by the event loop's clock; None before."""
-        self.n_refused = 0
-        """Messages that were no transforms."""
         self._connection = connection
         self._subscriptions: dict[str, Subscription] = {}
         self.news = News()
@@ -234,7 +232,6 @@ class FrameListener:
         try:
             transforms = read_transforms(message)
         except LinkError:
-            self.n_refused += 1
             return
         if self.tree.take(transforms, is_static=is_static) and not is_static:
             self.arrived_s = anyio.current_time()
