@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
+from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.fieldofview import (
     N_RAYS,
     CameraView,
@@ -99,3 +100,21 @@ def test_what_a_picture_shows_is_what_a_picture_there_would_add(yaw: float, half
     left = mask_pictured(ROOM, [CameraView(pose, half)])
     left_m = look_all_around(ROOM, MIDDLE).wall_m_by_heading(half, but=left)[ray_at(yaw)]
     assert left_m < promised_m / 2
+
+
+def test_a_wall_is_pictured_whole_between_rays_that_graze_it() -> None:
+    cells = np.full((30, 170), 100, dtype=np.int8)
+    cells[2:28, 2:168] = 0
+    corridor = OccupancyGrid(cells=cells, resolution_m=0.05, origin=Pose(0.0, 0.0, 0.0))
+    shown = mask_pictured(corridor, [CameraView(Pose(0.5, 0.8, 0.0))])
+    assert shown[2, 40:150].all()
+
+
+def test_a_grazed_wall_is_not_pictured_across_a_niche() -> None:
+    cells = np.full((30, 170), 100, dtype=np.int8)
+    cells[12:28, 2:168] = 0
+    cells[2:12, 90:104] = 0
+    corridor = OccupancyGrid(cells=cells, resolution_m=0.05, origin=Pose(0.0, 0.0, 0.0))
+    shown = mask_pictured(corridor, [CameraView(Pose(0.5, 1.3, 0.0))])
+    assert shown[12, 40:88].all()
+    assert not shown[2:10, 90:102].any()

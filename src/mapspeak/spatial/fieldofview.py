@@ -20,6 +20,8 @@ N_RAYS = 720
 _RAY_RAD = math.tau / N_RAYS
 _ANGLES_RAD: FloatArray = np.arange(N_RAYS, dtype=np.float64) * _RAY_RAD
 NO_WALL = -1
+JOINED_M = 0.8
+"""Neighbouring rays meet one wall as far apart at the end of sight, at 5 degrees to it."""
 LEAST_OUTLINE_M = 0.6
 """Shorter lines, there and back, are crumbs."""
 AT_ONCE = 64
@@ -180,14 +182,39 @@ def is_in_sight(grid: OccupancyGrid, place: Point, target: Point, *, own_m: floa
 def mask_pictured(grid: OccupancyGrid, views: Iterable[CameraView]) -> Mask:
     """Mark the walls that pictures show, by the free cells before them."""
     shown = np.zeros(grid.cells.shape, dtype=np.uint8)
+    most = round(JOINED_M / grid.resolution_m)
+    along_walls = cv2.dilate(grid.occupied.view(np.uint8), np.ones((5, 5), np.uint8)) > 0
     for view in views:
         n_rays = math.ceil(2 * view.half_view_rad / _RAY_RAD)
         turned = np.linspace(-view.half_view_rad, view.half_view_rad, n_rays)
         here = np.array([[view.pose.x, view.pose.y]])
-        walls, _, _ = _follow(grid, here, view.pose.yaw_rad + turned)
+        walls = _follow(grid, here, view.pose.yaw_rad + turned)[0][0]
         shown.ravel()[walls[walls != NO_WALL]] = 1
-    # Far rays leave out cells between them, and a map moves its walls by a cell as it grows.
+        shown.ravel()[_join_hits(walls, along_walls, most=most)] = 1
+    # A map moves its walls by a cell as it grows.
     return np.asarray((cv2.dilate(shown, np.ones((3, 3), np.uint8)) > 0) & grid.free)
+
+
+def _join_hits(walls: IntArray, along_walls: Mask, *, most: int) -> IntArray:
+    """Return the cells between the hits of neighbouring rays where a wall joins the hits.
+
+    Rays that graze a wall meet it far apart.
+
+    Args:
+        walls: The cells that the rays end at, or NO_WALL, shape (n,).
+        along_walls: The cells that are next to walls, or nearly.
+        most: Of cells that may lie between two hits.
+    """
+    n_cols = along_walls.shape[1]
+    cells = np.stack(np.divmod(walls, n_cols), axis=-1)
+    is_hit = (walls[1:] != NO_WALL) & (walls[:-1] != NO_WALL)
+    apart = np.abs(np.diff(cells, axis=0)).max(axis=1)
+    at = np.flatnonzero(is_hit & (apart > 1) & (apart <= most))
+    shares = np.linspace(0.0, 1.0, most + 1)[:, None]
+    lines = np.rint(cells[at, None] + shares * (cells[at + 1] - cells[at])[:, None]).astype(np.intp)
+    between = lines[..., 0] * n_cols + lines[..., 1]
+    is_along = along_walls.ravel()[between].all(axis=1)
+    return np.asarray(between[is_along].ravel(), dtype=np.intp)
 
 
 def measure_pictured(grid: OccupancyGrid, shown: Mask, places: FloatArray) -> float:
