@@ -241,3 +241,17 @@ def test_beside_a_turned_map_no_span_is_told_that_holds_the_goal() -> None:
     assert beside.verdict is GoalVerdict.OFF_MAP
     assert say_check(beside) == "(-2.00, 0.10) lies off the map."
     assert "spans x" in say_check(check_goal(grid, distances, Pose(-9.0, 0.1)))
+
+
+def test_on_a_fine_map_the_pose_that_is_told_instead_works_to_the_centimetre() -> None:
+    cells = np.zeros((60, 80), dtype=np.int8)
+    cells[:, :3] = cells[:3] = cells[:, -3:] = cells[-3:] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.01, origin=Pose(1.234, -2.345, 0.9))
+    robot = grid.origin.transform(Point(0.4, 0.3))
+    distances = distances_from(grid, robot, radius_m=0.1)
+    for n in range(40):
+        goal = grid.origin.transform(Point(0.02 * n, 0.01))
+        near = check_goal(grid, distances, Pose(goal.x, goal.y)).nearest
+        assert near is not None
+        told = Point(float(f"{near.x:.2f}"), float(f"{near.y:.2f}"))
+        assert distances.is_reachable(told)

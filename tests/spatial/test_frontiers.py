@@ -374,6 +374,42 @@ def test_what_lies_behind_a_gap_that_the_robot_did_not_pass_is_not_offered() -> 
     assert refused.gap_at == gap.point
 
 
+TWO_GAPS = """
+    ##################################????
+    #...............##...............?????
+    #...............##...............?????
+    #...............##...............?????
+    #................................?????
+    #................................?????
+    #................................?????
+    #...............##...............?????
+    #...............##...............?????
+    #...............##...............?????
+    #..........#######################????
+    #..........#######################
+    #.........................##.....#
+    #.........................##.....#
+    #................................#
+    #................................#
+    #................................#
+    #.........................##.....#
+    #.........................##.....#
+    ##################################
+    """
+
+
+def test_of_two_gaps_the_one_before_a_border_is_named_though_the_other_is_nearer() -> None:
+    robot = Point(0.6, 3.0)
+    grid = grid_from_text(TWO_GAPS, resolution_m=0.2)
+    distances = distances_from(grid, robot, radius_m=0.29)
+    gaps = [find_proved_gap(distances, goal) for goal in (Point(5.0, 3.0), Point(6.0, 0.9))]
+    above, below = (gap for gap in gaps if gap is not None)
+    found = find_frontiers(grid, robot, radius_m=0.29, tried=Tried(gaps=(above, below)))
+    (refused,) = found.refused
+    assert refused.anchor.distance_to(below.point) < refused.anchor.distance_to(above.point)
+    assert refused.gap_at == above.point
+
+
 def test_a_gap_that_the_map_shows_wider_is_tried_again() -> None:
     robot = Point(1.0, 1.0)
     grid = grid_from_text(GAP_BESIDE_THE_UNKNOWN, resolution_m=0.2)

@@ -67,6 +67,8 @@ FARTHEST_M = 1e6
 """No map is that large; larger numbers are typing errors, and overflow cell indices."""
 SEARCH_M = 8.0
 """How far around a goal another one is looked for first."""
+TOLD_M = 0.01
+"""Poses are told to the centimetre."""
 NEAR_M = 1.0
 """How far around a goal an obstacle is looked for first."""
 WALL_SIDES_M = 0.15
@@ -198,6 +200,9 @@ def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> 
 
 def _reachable_points(window: OccupancyGrid, distances: DistanceField) -> FloatArray:
     points = window.points_at(*np.nonzero(window.free))
+    if window.resolution_m < 2 * TOLD_M:
+        # What is told of a pose must lie in a cell that works, too.
+        points = points.round(2)
     rows, cols = distances.lattice.grid.cells_at(points)
     return points[np.isfinite(distances.distances_at(rows, cols))]
 

@@ -118,7 +118,7 @@ def _judge(
         if isinstance(new, list):
             open_ones.append((border, new))
         elif viewpoints:
-            refused.append(_refuse_tried(distances, border, new, tried))
+            refused.append(_refuse_tried(distances, border, new, viewpoints, tried))
         elif border.length_m >= NOISE_M:
             cut_off.append(border)
     # One and a half robots' width squared, a hundredth of the floor, or 0.5 m2 are worth a drive:
@@ -206,13 +206,20 @@ def _find_poses(
 
 
 def _refuse_tried(
-    distances: DistanceField, border: Border, reason: RefusalReason, tried: Tried
+    distances: DistanceField,
+    border: Border,
+    reason: RefusalReason,
+    viewpoints: Sequence[FrontierViewpoint],
+    tried: Tried,
 ) -> RefusedFrontier:
-    """Refuse a border for what drives have shown; of several gaps the nearest is named."""
+    """Refuse a border for what drives have shown; of the gaps before it the nearest is named."""
     refused = _refuse(distances, border, reason)
     if reason is not RefusalReason.PROVED_NARROW:
         return refused
-    gap = min(tried.gaps, key=lambda each: each.point.distance_to(refused.anchor))
+    rows, cols = rows_and_cols([each.cell for each in viewpoints])
+    before = [gap for gap in tried.gaps if mask_behind(distances, [gap])[rows, cols].all()]
+    gaps = before or tried.gaps
+    gap = min(gaps, key=lambda each: each.point.distance_to(refused.anchor))
     return replace(refused, gap_at=gap.point, gap_width_m=gap.width_m)
 
 
