@@ -34,7 +34,7 @@ from mapspeak.ros.robot.driving import (
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.plans import NavigationListener
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
-from mapspeak.ros.robot.sensors import CAMERA_HINT, Laser, RosCamera, find_camera_yaw_rad
+from mapspeak.ros.robot.sensors import Laser, RosCamera, find_camera_yaw_rad, no_camera
 from mapspeak.ros.robot.stopping import Brake, stop_everything
 from mapspeak.ros.transforms import FrameListener
 from mapspeak.spatial import OccupancyGrid
@@ -242,7 +242,7 @@ class RosRobot:
             name = self.description.find_camera(said)
             topics = next(each for each in self.profile.cameras if each.name == name)
         if topics is None:
-            raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
+            raise no_camera()
         if topics.name not in self._cameras:
             self._cameras[topics.name] = RosCamera(self.connection, self.profile, topics)
         return self._cameras[topics.name]

@@ -77,6 +77,11 @@ INFO_PATIENCE_S = 1.0
 CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
 
 
+def no_camera() -> LinkError:
+    """Return the error for a robot without a camera."""
+    return LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
+
+
 class RosCamera:
     """Takes pictures."""
 
