@@ -39,9 +39,9 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.worldmodel.model import WorldModel
 
-TURN_WORTH_M = 1.0
+TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
-DRIVE_WORTH_M = 1.0
+DRIVE_WORTH_M = 0.7
 """So much new wall all around a place is worth a drive there."""
 STOP_M = 1.0
 """What a stop costs beside the way to it."""
