@@ -13,7 +13,7 @@ from mapspeak.memory import Landmark, SemanticMap, Waypoint, build_ring
 from mapspeak.memory.things.finding import find_things
 from mapspeak.memory.things.likelihood import ViewLikelihood, build_outlook, weigh_view
 from mapspeak.memory.things.sight import SightMap, build_sight_map, find_log_priors, look_around
-from mapspeak.memory.things.thing import NOISE, Thing
+from mapspeak.memory.things.thing import NOISE, Stance, Thing
 from mapspeak.spatial import OccupancyGrid
 
 CELL_M = 0.1
@@ -71,7 +71,9 @@ def weighed(
     outlook = build_outlook(sight, STAND, near, far)
     view = weigh_view(sight, outlook, STAND, place.landmarks[0])
     assert view is not None
-    weights = view.ratios * np.exp(find_log_priors(sight, view.cells, [view.update], on_wall=False))
+    weights = view.ratios * np.exp(
+        find_log_priors(sight, view.cells, [view.update], Stance.ANYWHERE)
+    )
     rows, cols = sight.rows.ravel()[view.cells], sight.cols.ravel()[view.cells]
     ahead_m, aside_m = rows * CELL_M - STAND.y, np.abs(cols * CELL_M - STAND.x)
     is_ahead = aside_m < 0.15
@@ -169,8 +171,8 @@ def test_beams_that_met_nothing_and_beams_of_which_nothing_is_known_make_no_surf
 
 def test_the_same_surface_met_from_many_places_counts_once() -> None:
     sight, view, _ = weighed(bare(), furnished())
-    once = find_log_priors(sight, view.cells, [view.update], on_wall=False)
-    often = find_log_priors(sight, view.cells, [view.update] * 20, on_wall=False)
+    once = find_log_priors(sight, view.cells, [view.update], Stance.ANYWHERE)
+    often = find_log_priors(sight, view.cells, [view.update] * 20, Stance.ANYWHERE)
     assert np.array_equal(once, often)
 
 

@@ -59,6 +59,27 @@ def test_what_hangs_on_walls_is_placed_at_the_wall_behind_a_table_and_not_at_the
     assert standing.position.x < 7.0
 
 
+def test_a_table_is_placed_at_what_stands_free_more_surely_than_a_crate() -> None:
+    table, crate = (
+        seen_down_the_corridor(None, label=label, source="picture", text=WITH_A_TABLE)
+        for label in ("table", "crate")
+    )
+    assert table.position is not None
+    assert table.position.x < 7.0
+    assert table.uncertainty_m is not None
+    assert crate.uncertainty_m is not None
+    assert table.uncertainty_m < crate.uncertainty_m - 1.0
+
+
+def test_a_thing_right_before_the_robot_has_a_place() -> None:
+    mark = Landmark(label="chair", bearing_rad=-1.628, bearing_from="picture")
+    place = Waypoint(name="a", pose=Pose(4.78, 0.63, 0.0), functional_landmarks=(mark,))
+    grid = grid_from_text(WITH_A_TABLE, resolution_m=0.25)
+    (thing,) = find_things(SemanticMap(waypoints=(place,)), grid).things
+    assert thing.position is not None
+    assert thing.position.distance_to(place.pose.point) < 0.8
+
+
 def test_a_direction_that_was_measured_says_more_than_one_that_was_judged() -> None:
     judged = seen_down_the_corridor(3.0)
     measured = seen_down_the_corridor(3.0, source="picture")

@@ -61,7 +61,7 @@ class _Ballot:
             sight,
             self.places,
             (each.update for each in likelihoods),
-            on_wall=sightings[0].is_on_wall,
+            sightings[0].stance,
         )
         n_places = len(self.places)
         self.votes: FloatArray = log_priors + np.bincount(

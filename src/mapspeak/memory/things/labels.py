@@ -9,6 +9,7 @@ from functools import lru_cache
 from mapspeak.memory.policy import half_lives, words_of
 from mapspeak.memory.search.kinds import ThingKind, find_kinds, find_kinds_called
 from mapspeak.memory.search.wordindex import without_accents
+from mapspeak.memory.things.thing import Stance
 
 INSTALLED_H = 5 * 365 * 24.0
 """What is fixed to the building stays for years."""
@@ -60,10 +61,13 @@ def names_no_less(label: str, asked: str) -> bool:
 
 
 @lru_cache(maxsize=MOST_KEPT)
-def hangs_on_walls(label: str) -> bool:
-    """Return True for things that hang on walls, as is commonly known: "fire extinguisher"."""
-    kinds = _parts_of(label).kinds or find_kinds(label)
-    return any(name in words_of("on_walls") for kind in kinds for name in kind.names)
+def find_stance(label: str) -> Stance:
+    """Return where such things are, as is commonly known: a fire extinguisher hangs on a wall."""
+    parts = _parts_of(label)
+    if parts.tokens[-1] in words_of("free"):
+        return Stance.FREE
+    names = (name for kind in parts.kinds or find_kinds(label) for name in kind.names)
+    return Stance.ANYWHERE if words_of("on_walls").isdisjoint(names) else Stance.ON_WALL
 
 
 @lru_cache(maxsize=MOST_KEPT)

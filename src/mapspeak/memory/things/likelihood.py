@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Pose
-from mapspeak.memory.things.labels import hangs_on_walls
+from mapspeak.memory.things.labels import find_stance
 from mapspeak.memory.things.sight import (
     BODY_M,
     LaserUpdate,
@@ -18,7 +18,7 @@ from mapspeak.memory.things.sight import (
     find_log_priors,
     look_around,
 )
-from mapspeak.memory.things.thing import NOISE, Category
+from mapspeak.memory.things.thing import NOISE, Category, Stance
 from mapspeak.memory.waypoint import Landmark, Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
@@ -110,10 +110,11 @@ def weigh_view(
     cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
     update = None
     if landmark.bearing_rad is not None:
-        sigma = NOISE.bearing_rad_of(landmark)
         ahead = pose.yaw_rad + landmark.bearing_rad - sight.grid.origin.yaw_rad
         off = np.abs(np.remainder(outlook.angles - ahead + math.pi, math.tau) - math.pi)
-        near = np.flatnonzero(off <= _FARTHEST_SIGMAS * sigma)
+        sigma = NOISE.bearing_rad_of(landmark)
+        # Right before a robot cells are wide, and the middle of none may lie in the direction.
+        near = np.flatnonzero(off <= max(_FARTHEST_SIGMAS * sigma, float(off.min(initial=math.pi))))
         bell = np.exp(-0.5 * (off[near] / sigma) ** 2) * (math.sqrt(math.tau) / sigma)
         cells, ratios, ranges_m = cells[near], ratios[near], ranges_m[near]
         if landmark.laser is not None:
@@ -149,7 +150,7 @@ class WeighedView:
         waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
         number: Of the landmark, among those of the standpoint.
         likelihood: Where it may be; None where nothing says.
-        is_on_wall: Such things hang on walls.
+        stance: Where such things are.
         least_ratio: It speaks of places that it makes so much likelier.
         spoken_of: The cells that it speaks of; where it contradicts the map, all that are near.
     """
@@ -160,7 +161,7 @@ class WeighedView:
     category: Category
     wrong_ratio: float
     likelihood: ViewLikelihood | None
-    is_on_wall: bool
+    stance: Stance
     least_ratio: float
     spoken_of: IntArray
 
@@ -216,8 +217,8 @@ def _read(
             likelihood = weigh_view(sight, outlook, waypoint.pose, landmark)
             if likelihood is not None and not likelihood.ratios.any():
                 likelihood = None
-            is_on_wall = hangs_on_walls(landmark.label)
-            least_ratio = _least_ratio(sight, likelihood, on_wall=is_on_wall)
+            stance = find_stance(landmark.label)
+            least_ratio = _least_ratio(sight, likelihood, stance)
             sightings.append(
                 WeighedView(
                     waypoint=waypoint,
@@ -226,7 +227,7 @@ def _read(
                     category=category,
                     wrong_ratio=NOISE.wrong_ratio_of(landmark.confidence),
                     likelihood=likelihood,
-                    is_on_wall=is_on_wall,
+                    stance=stance,
                     least_ratio=least_ratio,
                     spoken_of=_find_spoken_of(sight, likelihood, least_ratio),
                 )
@@ -236,15 +237,15 @@ def _read(
     )
 
 
-def _least_ratio(sight: SightMap, likelihood: ViewLikelihood | None, *, on_wall: bool) -> float:
+def _least_ratio(sight: SightMap, likelihood: ViewLikelihood | None, stance: Stance) -> float:
     """Return how much likelier than by chance a thing has to make a view, to be what it shows.
 
     Else a thing of its own explains the view better (Bayes), of which so many are on each metre.
     """
     if likelihood is None:
         return LEAST_RATIO
-    log_priors = find_log_priors(sight, likelihood.cells, (likelihood.update,), on_wall=on_wall)
-    per_cell = HANGING_PER_CELL if on_wall else STANDING_PER_CELL
+    log_priors = find_log_priors(sight, likelihood.cells, (likelihood.update,), stance)
+    per_cell = HANGING_PER_CELL if stance is Stance.ON_WALL else STANDING_PER_CELL
     return max(LEAST_RATIO, per_cell * float(np.exp(log_priors) @ likelihood.ratios))
 
 

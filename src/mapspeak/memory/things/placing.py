@@ -175,14 +175,12 @@ def _behind(surface: Point, seen_from: Sequence[Point]) -> Point:
 def _log_weights(sight: SightMap, views: Sequence[WeighedView]) -> tuple[IntArray, FloatArray]:
     """Return cells, and in logarithms their prior, then what each view says of them."""
     said = [likelihood_of(view) for view in views]
-    is_spoken_of = np.zeros(sight.log_prior.size, dtype=np.bool_)
+    is_spoken_of = np.zeros(sight.rows.size, dtype=np.bool_)
     for each in said:
         is_spoken_of[each.cells] = True
     cells = np.flatnonzero(is_spoken_of)
     logs = np.empty((len(views) + 1, len(cells)))
-    logs[0] = find_log_priors(
-        sight, cells, (each.update for each in said), on_wall=views[0].is_on_wall
-    )
+    logs[0] = find_log_priors(sight, cells, (each.update for each in said), views[0].stance)
     for i, (view, each) in enumerate(zip(views, said, strict=True), start=1):
         logs[i] = view.wrong_ratio
         logs[i, np.searchsorted(cells, each.cells)] += (1 - view.wrong_ratio) * each.ratios

@@ -12,7 +12,7 @@ several looks say of a cell, that counts which makes it likeliest, once (`find_l
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Pose
 from mapspeak.memory.laserfan import LaserFan
-from mapspeak.memory.things.thing import NOISE
+from mapspeak.memory.things.thing import NOISE, Stance
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import build_cleared
@@ -48,8 +48,8 @@ class SightMap:
         obstacle_off: Cells to the nearest obstacle or unknown cell, from each.
         wall_off: The same where what stands free does not count.
         factor: How many cells of the map make the side of one of the lattice.
-        log_prior: How likely a thing is in each lattice cell before any view, as a logarithm.
-        wall_log_prior: The same of a thing that hangs on walls.
+        log_priors: How likely a thing is in each lattice cell before any view, as a logarithm, by
+            its stance.
         rows: Of the place that stands for each lattice cell: the middle of its obstacles.
         cols: The same, in fractional cells of the map.
     """
@@ -58,8 +58,7 @@ class SightMap:
     obstacle_off: Clearance
     wall_off: Clearance
     factor: int
-    log_prior: FloatArray
-    wall_log_prior: FloatArray
+    log_priors: Mapping[Stance, FloatArray]
     rows: FloatArray
     cols: FloatArray
 
@@ -96,16 +95,20 @@ def build_sight_map(grid: OccupancyGrid) -> SightMap:
     shares, rows, cols = _summarise(grid.occupied, factor)
     on_floor = min(NOISE.floor_per_m * factor * grid.resolution_m, 1.0)
     has_wall, has_any = _summarise(walls, factor)[0] > 0, shares > 0
-    on_furniture = NOISE.on_furniture_ratio
+    has_free = _summarise(grid.occupied & ~walls, factor)[0] > 0
+    misplaced = NOISE.misplaced_ratio
     return SightMap(
         grid=grid,
         obstacle_off=_off(grid.occupied | grid.unknown),
         wall_off=_off(blocked),
         factor=factor,
-        log_prior=np.log(np.where(has_any, 1.0, on_floor)),
-        wall_log_prior=np.log(
-            np.where(has_wall, 1.0, np.where(has_any, on_furniture, on_floor * on_furniture))
-        ),
+        log_priors={
+            Stance.ANYWHERE: np.log(np.where(has_any, 1.0, on_floor)),
+            Stance.ON_WALL: np.log(
+                np.where(has_wall, 1.0, np.where(has_any, misplaced, on_floor * misplaced))
+            ),
+            Stance.FREE: np.log(np.where(has_free, 1.0, np.where(has_any, misplaced, on_floor))),
+        },
         rows=rows,
         cols=cols,
     )
@@ -219,7 +222,7 @@ def correct_by_laser(
     inside = inside[is_update[number[inside]]]
     beam, far_m, cells = number[inside], ranges_m[inside], cells[inside]
     behind_m = far_m - end_m[beam]
-    log_priors = sight.log_prior.ravel()[cells]
+    log_priors = sight.log_priors[Stance.ANYWHERE].ravel()[cells]
     met = np.exp(-0.5 * (behind_m / NOISE.laser_m) ** 2) * (NOISE.laser_met_ratio * is_new[beam])
     likelier = np.log(np.exp(log_priors) + (1 - np.exp(log_priors)) * met)
     is_passed = is_through[beam] & (behind_m < -NOISE.laser_update_m) & (log_priors == 0.0)
@@ -231,10 +234,10 @@ def correct_by_laser(
 
 
 def find_log_priors(
-    sight: SightMap, cells: IntArray, updates: Iterable[LaserUpdate | None], *, on_wall: bool
+    sight: SightMap, cells: IntArray, updates: Iterable[LaserUpdate | None], stance: Stance
 ) -> FloatArray:
     """Return how likely a thing is in rising lattice cells before any view, as a logarithm."""
-    logs = (sight.wall_log_prior if on_wall else sight.log_prior).ravel()[cells]
+    logs = sight.log_priors[stance].ravel()[cells]
     told = [each for each in updates if each is not None and each.cells.size]
     if not told:
         return logs

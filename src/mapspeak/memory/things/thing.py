@@ -35,7 +35,8 @@ class NoiseModel:
         floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
         reach_m: Nobody names a thing that is farther.
         named_m: At so many metres things are named .61 times as often as near by (a Gaussian).
-        on_furniture_ratio: How likely what hangs on walls is at what stands free.
+        misplaced_ratio: How likely what hangs on walls is at what stands free, and a table at a
+            wall.
         laser_m: Standard deviation of where the middle of a cell is that a beam of the laser ended
             in: what pose and map are good to, and half a cell.
         laser_update_m: A beam that ends nearer to something on the map has met just that.
@@ -57,7 +58,7 @@ class NoiseModel:
     floor_per_m: float = 0.1
     reach_m: float = 20.0
     named_m: float = 10.0
-    on_furniture_ratio: float = 0.1
+    misplaced_ratio: float = 0.1
     laser_m: float = 0.15
     laser_update_m: float = 0.3
     laser_met_ratio: float = 0.9
@@ -74,6 +75,14 @@ class NoiseModel:
 
 
 NOISE = NoiseModel()
+
+
+class Stance(StrEnum):
+    """Where such things usually are: on walls, as signs, or away from them, as tables."""
+
+    ANYWHERE = "anywhere"
+    ON_WALL = "on_wall"
+    FREE = "free"
 
 
 class Category(StrEnum):
