@@ -2,6 +2,7 @@
 
 import os
 import re
+import select
 import shutil
 import signal
 import subprocess
@@ -42,11 +43,14 @@ class Desk:
     tools: Path
     uv_log: Path
 
-    def start(self, *command: str, checkout: Path | None = None) -> subprocess.Popen[str]:
+    def start(
+        self, *command: str, checkout: Path | None = None, stdin: int | None = None
+    ) -> subprocess.Popen[str]:
         return subprocess.Popen(  # noqa: S603 - our own script
             [(checkout or self.checkout) / "run", *command],
             cwd=self.tools,
             env={"PATH": str(self.tools), "UV_LOG": str(self.uv_log)},
+            stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -171,6 +175,25 @@ def test_a_client_that_kills_a_call_too_soon_finds_the_environment_next_time(des
     assert desk.calls_of_uv() == MADE
     assert desk.run("python", "second") == (0, "python second\n", "")
     assert desk.calls_of_uv() == []
+
+
+def test_ctrl_c_in_a_terminal_ends_the_installation_too(desk: Desk) -> None:
+    (desk.tools / "setsid").symlink_to(shutil.which("setsid") or pytest.fail("no setsid here"))
+    gate = Path(f"{desk.uv_log}.gate")
+    os.mkfifo(gate)
+    main, terminal = os.openpty()
+    call = desk.start("python", "first", stdin=terminal)
+    with gate.open("w") as held:
+        os.killpg(call.pid, signal.SIGINT)
+        assert call.wait(timeout=30) == 130
+        readers = select.poll()
+        readers.register(held, 0)
+        assert readers.poll(30_000), "nobody installs any more"
+    gate.unlink()
+    call.communicate()
+    for end in (main, terminal):
+        os.close(end)
+    assert desk.run("python", "second")[0] == 0
 
 
 def test_what_could_not_be_installed_ends_the_call(desk: Desk) -> None:
