@@ -16,6 +16,7 @@ from mapspeak.memory.policy import (
     Concern,
     find_concern,
     gives_orders,
+    is_purpose,
     tells_what_to_do,
 )
 from mapspeak.memory.quoting import name_key
@@ -45,6 +46,7 @@ __all__ = [
     "find_concern",
     "gives_orders",
     "group_views",
+    "is_purpose",
     "merge_waypoint",
     "name_key",
     "noted_at",

@@ -98,6 +98,7 @@ class _Patterns:
     names_a_carrier: re.Pattern[str]
     doubt: re.Pattern[str]
     order: re.Pattern[str]
+    use: re.Pattern[str]
     addressed: re.Pattern[str]
 
 
@@ -106,7 +107,10 @@ def _patterns() -> _Patterns:
     known = _knowledge()
     carrier = rf"\b(?:{'|'.join(known['carriers'].split())})s?\b"
     parts = known["order_parts"]
-    orders = (re.sub("<([a-z]+)>", lambda part: parts[part[1]], each) for each in known["orders"])
+    use, *orders = (
+        re.sub("<([a-z]+)>", lambda part: parts[part[1]], each)
+        for each in (known["use"], *known["orders"])
+    )
     return _Patterns(
         told=re.compile(rf"\b(?:{'|'.join(known['told_by'].split())})\b.*"),
         carrier=re.compile(carrier),
@@ -116,6 +120,7 @@ def _patterns() -> _Patterns:
         ),
         doubt=re.compile("|".join(rf"\b(?:{words})\b" for words in known["doubts"]) + r"|\?"),
         order=re.compile("|".join(orders)),
+        use=re.compile(use),
         addressed=re.compile(known["addressed"]),
     )
 
@@ -158,6 +163,12 @@ def tells_what_to_do(text: str) -> bool:
     """Return True if any sentence of a text gives orders."""
     unquoted = _QUOTED.sub(" ", text.translate(_STRAIGHT))
     return any(gives_orders(part) for part in _SENTENCE_END.split(unquoted))
+
+
+def is_purpose(text: str) -> bool:
+    """Return True unless a purpose gives orders; what a thing is for may read like one."""
+    use = _patterns().use.match(_plain(text))
+    return not tells_what_to_do(text if use is None else _plain(text)[use.end() :])
 
 
 def _plain(text: str) -> str:

@@ -1,7 +1,7 @@
 """The arguments of `write_semantic_data`, sorted into accepted and refused things."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -22,6 +22,7 @@ from mapspeak.memory import (
     TakenPicture,
     Waypoint,
     find_concern,
+    is_purpose,
     noted_at,
     tells_what_to_do,
 )
@@ -185,13 +186,13 @@ class Annotator:
                 bearing_from = range_from
         landmark = Landmark(
             label=thing.label,
-            purpose=self._told(thing, "purpose"),
+            purpose=self._told(thing, "purpose", is_purpose),
             bearing_rad=bearing_rad,
             range_m=range_m,
             range_from=range_from,
             bearing_from=bearing_from,
             confidence=thing.confidence,
-            note=self._told(thing, "note"),
+            note=self._told(thing, "note", lambda said: not tells_what_to_do(said)),
             picture=None if other is None else other.name,
             stamp_s=None if other is None else other.stamp_s,
             recorded_at=None if other is None else other.recorded_at,
@@ -210,9 +211,11 @@ class Annotator:
             return fan
         return self.laser.find_fan(stood, bearing_rad)
 
-    def _told(self, thing: LandmarkInput, name: str) -> str | None:
+    def _told(
+        self, thing: LandmarkInput, name: str, is_allowed: Callable[[str], bool]
+    ) -> str | None:
         text: str | None = getattr(thing, name)
-        if text is None or not tells_what_to_do(text):
+        if text is None or is_allowed(text):
             return text
         self.refused.append(f"the {name} of {thing.label!r}: {LEFT_OUT[Concern.ORDERS]}")
         return None
