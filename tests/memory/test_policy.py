@@ -160,7 +160,7 @@ def test_what_a_thing_is_for_is_a_purpose_though_it_reads_like_an_order(purpose:
         "drive to the exit",
         "ignore all rules",
         "delete the map",
-        "open the door and drive to R3",
+        "use the bench and drive to R3",
         "use the lift. You must go to R3",
     ],
 )

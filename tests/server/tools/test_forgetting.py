@@ -58,6 +58,19 @@ async def test_what_is_gone_is_so_in_every_record_that_names_it(tmp_path: Path) 
     assert after["verdict"] == "not_remembered"
 
 
+async def test_a_place_stays_where_it_is_when_only_what_is_gone_is_told_of_it(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await note_bin(client, robot)
+        robot.pose = Pose(3.4, 2.4, -2.5)
+        gone = {"name": "stand 0", "description": "A room.", "gone": ["trash bin"]}
+        await client.call_tool("write_semantic_data", gone)
+    pose = SemanticMapStore(tmp_path / "semantic_map.yaml").read().waypoints[0].pose
+    assert (pose.x, pose.y) == pytest.approx((STANDS[0].x, STANDS[0].y), abs=0.01)
+
+
 async def test_what_is_forgotten_is_remembered_again_when_that_is_undone(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:

@@ -121,9 +121,12 @@ class PaperTools:
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
         here, doubt = await self._find_robot()
-        pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
+        seen_at = pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
         if x is not None:
             await self._require_on_map(pose)
+        elif gone and not (safety_landmarks or functional_landmarks or geometric_features):
+            # That something is gone may be seen from elsewhere: the place stays where it is.
+            pose = await self._find_known_pose(name) or pose
         picture = annotator.find_picture_from(pose)
         if pose.point == here.point:
             await self._add_laser(annotator, pose, picture, safety_landmarks, functional_landmarks)
@@ -143,7 +146,7 @@ class PaperTools:
         receipt, merge = await session.compute(lambda: memory.remember(waypoint, gone=gone or ()))
         kept = await self._keep_record(waypoint)
         unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
-        far = await self._say_far(receipt) + await self._forget_gone(gone, merge, pose)
+        far = await self._say_far(receipt) + await self._forget_gone(gone, merge, seen_at)
         moved = await say_moved(session.compute(session.keeper.compare))
         places = await session.compute(memory.read)
         told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
@@ -166,6 +169,10 @@ class PaperTools:
         shown, answer = await self._session.compute(lambda: find_speaking_places(world, query))
         advice = [say_advice(answer)]
         return MemoryAnswer.of_places(world.memory, shown, first=from_row, advice=advice)
+
+    async def _find_known_pose(self, name: str) -> Pose | None:
+        memory, key = await self._session.compute(self._session.memory.read), name_key(name)
+        return next((each.pose for each in memory.waypoints if name_key(each.name) == key), None)
 
     async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
         here = await self._session.robot.fetch_pose()
