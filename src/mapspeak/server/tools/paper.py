@@ -121,12 +121,9 @@ class PaperTools:
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
         here, doubt = await self._find_robot()
-        seen_at = pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
-        if x is not None:
-            await self._require_on_map(pose)
-        elif gone and not (safety_landmarks or functional_landmarks or geometric_features):
-            # That something is gone may be seen from elsewhere: the place stays where it is.
-            pose = await self._find_known_pose(name) or pose
+        seen_at = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
+        shows = safety_landmarks or functional_landmarks or geometric_features or not gone
+        pose = await self._find_stand(name, seen_at, is_told=x is not None, shows=bool(shows))
         picture = annotator.find_picture_from(pose)
         if pose.point == here.point:
             await self._add_laser(annotator, pose, picture, safety_landmarks, functional_landmarks)
@@ -170,9 +167,15 @@ class PaperTools:
         advice = [say_advice(answer)]
         return MemoryAnswer.of_places(world.memory, shown, first=from_row, advice=advice)
 
-    async def _find_known_pose(self, name: str) -> Pose | None:
+    async def _find_stand(self, name: str, seen_at: Pose, *, is_told: bool, shows: bool) -> Pose:
+        """Return where a place lies; one of which only something is gone stays where it was."""
+        if is_told:
+            await self._require_on_map(seen_at)
+        if is_told or shows:
+            return seen_at
         memory, key = await self._session.compute(self._session.memory.read), name_key(name)
-        return next((each.pose for each in memory.waypoints if name_key(each.name) == key), None)
+        poses = (each.pose for each in memory.waypoints if name_key(each.name) == key)
+        return next(poses, seen_at)
 
     async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
         here = await self._session.robot.fetch_pose()
