@@ -104,6 +104,7 @@ class SkillCode(StrEnum):
     """Why a run ended as it did."""
 
     DONE = "done"
+    SENT = "sent"
     CANCELLED = "cancelled"
     STOPPED = "stopped"
     TOO_LATE = "too_late"

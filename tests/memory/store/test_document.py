@@ -226,6 +226,11 @@ def test_many_misspelt_keys_are_counted() -> None:
         ("pose: [1, 2, 3]", "line 3, column 11", "pose is not a mapping"),
         ("pose:", "line 3, column 10", "pose is not a mapping"),
         ("description: none", "line 2, column 5", "pose is missing"),
+        (
+            "pose: {x: 1,5, y: 1, yaw_deg: 0}",
+            "line 3, column 19",
+            "pose.5 is not a key that belongs here",
+        ),
         ("pose: {x: 1, y: 1, x: 2, yaw_deg: 0}", "line 3, column 24", '"x" stands here twice'),
         ("pose: {x: 1, y: 1, yaw_deg: 0", "line 4, column 1", "not YAML"),
         ("\tpose: {x: 1, y: 1, yaw_deg: 0}", "line 3, column 5", "tab"),

@@ -89,7 +89,10 @@ async def test_a_topic_of_a_nested_type_of_its_own_is_a_tool_that_publishes(
     system = tool_system(dialect, topic, more=ARM)
     async with exposed(system, tmp_path) as caller:
         tools = await caller.until(lambda tools: "publish_tool_grip" in tools)
-        await caller.ask("publish_tool_grip", reach_mode=1, reach_via=[{"x": 0.5}], force=2)
+        sent = {"reach_mode": 1, "reach_via": [{"x": 0.5}], "force": 2}
+        assert "It was published; what the robot makes of it" in await caller.ask(
+            "publish_tool_grip", **sent
+        )
         too_many = await caller.refuse("publish_tool_grip", reach_via=[{}, {}, {}, {}])
         no_number = await caller.refuse("publish_tool_grip", force="strong")
         while not messages:

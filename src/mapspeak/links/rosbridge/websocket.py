@@ -17,7 +17,7 @@ from websockets.protocol import State
 from websockets.streams import StreamReader
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.address import RobotAddress
+from mapspeak.links.rosbridge.address import DEFAULT_PORT, RobotAddress
 from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
 
 READ_BYTES = 262_144
@@ -298,8 +298,7 @@ def _refusal(address: RobotAddress, error: Exception) -> LinkError:
 
 
 def _no_rosbridge(address: RobotAddress, what: str) -> LinkError:
-    return LinkError(
-        f"{address.shown} is not a rosbridge server: it {what}.",
-        hint=f"rosbridge listens on port {address.uri.port} only if told so; its usual port is "
-        f"9090. {START_HINT}",
-    )
+    port, hint = address.uri.port, START_HINT
+    if port != DEFAULT_PORT:
+        hint = f"The usual port of rosbridge is {DEFAULT_PORT}, not {port}. {START_HINT}"
+    return LinkError(f"{address.shown} is not a rosbridge server: it {what}.", hint=hint)

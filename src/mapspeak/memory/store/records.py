@@ -159,8 +159,8 @@ class RecordKind:
         """Return a mapping without the optional keys under which nothing stands."""
         if not isinstance(data, dict) or None not in data.values():
             return data
-        needed = {key.name for key in self.keys if key.is_required}
-        return {name: said for name, said in data.items() if said is not None or name in needed}
+        unsaid = {key.name for key in self.keys if not key.is_required}
+        return {name: said for name, said in data.items() if said is not None or name not in unsaid}
 
 
 def _said(data: dict[str, Data]) -> dict[str, Data]:

@@ -68,8 +68,8 @@ WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
 def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
     """Return the caption of the map in grey levels and nothing else."""
     return (
-        f"{_say_placement(grid, picture)} Grey 127 is unknown, 255 free, darker the more surely "
-        "occupied. x grows to the right and y upwards."
+        f"{_say_placement(grid, picture)} Grey 127 is unknown, lighter the more surely free, "
+        "darker the more surely occupied. x grows to the right and y upwards."
     )
 
 

@@ -22,6 +22,7 @@ EFFECTS = {
 }
 CODES = {
     SkillCode.DONE: "",
+    SkillCode.SENT: "It was published; what the robot makes of it is not told.",
     SkillCode.CANCELLED: "It was cancelled before it was done.",
     SkillCode.STOPPED: "The robot was stopped, or its server ended it, before it was done.",
     SkillCode.TOO_LATE: "It had not ended in time and was ended.",

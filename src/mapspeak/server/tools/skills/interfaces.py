@@ -149,7 +149,7 @@ class _Opened:
         await self.ros.publisher.publish(
             PublishRun(topic=name, type=self.described.said, message=message, duration_s=lasts_s)
         )
-        return succeeded()
+        return SkillOutcome(SkillState.SUCCEEDED, SkillCode.SENT)
 
     async def read(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Read the topic's latest message; wait for one, where none has come yet."""
