@@ -21,6 +21,7 @@ from mapspeak.places.things import forget
 from mapspeak.places.ways import find_way
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.remembered import RememberedThing
 from remembering import look, world_of
 
 DOCK = Waypoint(name="Dock corner", pose=Pose(6.0, 1.5, 0.5))
@@ -262,6 +263,18 @@ def test_every_thing_of_a_name_is_meant_whether_it_is_numbered_or_not() -> None:
 def test_how_far_the_nearest_is_and_of_how_many_is_told() -> None:
     found = find_place(world_of_chargers(), "nearest charger")
     assert found.reason.endswith("m by path from the robot, of 3")
+
+
+def test_a_thing_is_meant_by_another_name_of_its_kind_where_none_is_called_so() -> None:
+    box = Landmark(label="first-aid box", bearing_rad=0.0, range_m=0.8)
+    place = Waypoint(name="hall", pose=Pose(1.0, 1.4), functional_landmarks=(box,))
+    memory = SemanticMap(waypoints=(place,))
+    world = WorldModel(two_rooms(), Pose(1.5, 1.4), memory, radius_m=0.2)
+    found = find_place(world, "the first-aid kit")
+    assert isinstance(found.thing, RememberedThing)
+    assert found.thing.thing.label == "first-aid box"
+    with pytest.raises(GoalError, match="no place called"):
+        find_place(world, "the kit")
 
 
 @pytest.mark.parametrize("words", ["fourth-nearest charger", "the four nearest chargers"])

@@ -194,14 +194,18 @@ class EntryIndex:
         )
 
     def find_called(self, query: str) -> set[str]:
-        """Return the ids of entries with that very name, whatever its case, number or spelling."""
+        """Return the ids of entries with that very name, whatever its case, number or spelling.
+
+        Where none has it, of those of a kind that is called so too: "first-aid kit" for a box.
+        """
         understood = self._understand(query, self._words.ask(query))
         numbers = chain(
             self._of_key.find(name_key(query)),
             self._of_letters.find(_letters_of(query)),
             self._of_letters.find(_letters_of(understood)),
         )
-        return {self._entries[number].id for number in numbers}
+        called = set(numbers) or self._of_other.find(_letters_of(understood))
+        return {self._entries[number].id for number in called}
 
     def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
         """Return the request with its spelling corrected, or the name that it resembles."""
