@@ -71,6 +71,27 @@ def test_a_table_is_placed_at_what_stands_free_more_surely_than_a_crate() -> Non
     assert table.uncertainty_m < crate.uncertainty_m - 1.0
 
 
+HIDDEN_WALL = """
+    ########################################
+    #..................#...................#
+    #..................#...................#
+    #................##?##.................#
+    #................##?##.................#
+    #................##?##.................#
+    #................##?##.................#
+    #..................#...................#
+    #..................#...................#
+    ########################################
+"""
+
+
+def test_nothing_is_seen_through_a_wall_that_furniture_hides_on_both_sides() -> None:
+    clock = seen_down_the_corridor(None, label="clock", source="picture", text=HIDDEN_WALL)
+    assert clock.position is not None
+    assert clock.uncertainty_m is not None
+    assert clock.position.x + clock.uncertainty_m < 7.0
+
+
 def test_a_thing_right_before_the_robot_has_a_place() -> None:
     mark = Landmark(label="chair", bearing_rad=-1.628, bearing_from="picture")
     place = Waypoint(name="a", pose=Pose(4.78, 0.63, 0.0), functional_landmarks=(mark,))

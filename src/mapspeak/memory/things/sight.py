@@ -32,6 +32,8 @@ LATTICE_M = 0.2
 """The side of the cells in which a thing is looked for; finer than any view can tell."""
 FURNITURE_M = 2.5
 """What is no longer than this and touches no wall stands free, and one may see over it."""
+HIDDEN_M = 1.0
+"""Of a wall, furniture on both sides hides no longer piece."""
 BODY_M = 0.3
 """A thing's middle lies up to so far behind the surface that the robot has met."""
 OWN_M = 0.2
@@ -91,6 +93,7 @@ def build_sight_map(grid: OccupancyGrid) -> SightMap:
     cleared = build_cleared(grid)
     walls = grid.occupied & ~_small_parts(grid, grid.occupied) & ~cleared
     blocked = walls | (grid.unknown & ~_small_parts(grid, grid.unknown) & ~cleared)
+    blocked |= _run_on(blocked, grid)
     factor = max(round(LATTICE_M / grid.resolution_m), 1)
     shares, rows, cols = _summarise(grid.occupied, factor)
     on_floor = min(NOISE.floor_per_m * factor * grid.resolution_m, 1.0)
@@ -134,6 +137,14 @@ def _small_parts(grid: OccupancyGrid, mask: Mask) -> Mask:
     is_small = np.hypot(sides[:, 0], sides[:, 1]) <= FURNITURE_M
     is_small[0] = False
     return np.asarray(is_small[labels]) if n > 1 else np.zeros(grid.cells.shape, dtype=np.bool_)
+
+
+def _run_on(blocked: Mask, grid: OccupancyGrid) -> Mask:
+    """Return True where a wall runs on in line behind what stands at it on both sides."""
+    n_cells, found = round(HIDDEN_M / grid.resolution_m) | 1, np.zeros_like(blocked)
+    for line in (np.ones((1, n_cells), np.uint8), np.ones((n_cells, 1), np.uint8)):
+        found |= cv2.morphologyEx(blocked.view(np.uint8), cv2.MORPH_CLOSE, line) > 0
+    return found & ~grid.free
 
 
 def _off(blocked: Mask) -> Clearance:
