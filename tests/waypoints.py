@@ -60,7 +60,7 @@ _NUMBERS = st.floats(-1e6, 1e6) | st.sampled_from([-0.0, -0.0004, 1e-9, 12.3456]
 _ANGLES = st.floats(-7.0, 7.0)
 _POSES = st.builds(Pose, _NUMBERS, _NUMBERS, _ANGLES)
 _ZONES = st.sampled_from([UTC, timezone(timedelta(hours=9)), timezone(-timedelta(hours=3.5))])
-_TIMES = st.datetimes(datetime(1, 1, 2), datetime(9999, 12, 30), timezones=_ZONES)  # noqa: DTZ001 - the bounds take no zone
+_TIMES = st.datetimes(datetime(2, 1, 1), datetime(9998, 12, 31), timezones=_ZONES)  # noqa: DTZ001 - the bounds take no zone
 
 
 def laser_fans() -> st.SearchStrategy[LaserFan]:

@@ -226,7 +226,8 @@ async def test_several_topics_are_measured_in_one_call(tmp_path: Path) -> None:
     head, scan, sonar, scann = text.splitlines()
     assert head == "listened for 0.4 s"
     assert re.match(
-        r"/scan: [\d.]+ Hz, \d+ messages, about [\d.]+ kB/s; stamp 99\.900 s, 0\.10 s behind", scan
+        r"/scan: [\d.]+ Hz, [\d,]+ messages, about [\d.]+ kB/s; stamp 99\.900 s, 0\.10 s behind",
+        scan,
     )
     assert re.match(
         r"/sonar: SILENT, nothing came in the 0\.\d s since we listen; published", sonar

@@ -33,7 +33,7 @@ async def test_the_bandwidth_of_a_topic_is_told_with_its_rate(tmp_path: Path, ro
         publishing(scripted, "/scan", scan_of(ros)),
     ):
         text = await caller.ask("ros_rates", topics=["/scan"], duration_s=0.4)
-    told = re.search(r"/scan: ([\d.]+) Hz, \d+ messages, about ([\d.]+) (k|M)B/s; stamp", text)
+    told = re.search(r"/scan: ([\d.]+) Hz, [\d,]+ messages, about ([\d.]+) (k|M)B/s; stamp", text)
     assert told, text
     n_kb = float(told[2]) * (1000.0 if told[3] == "M" else 1.0)
     assert n_kb == pytest.approx(float(told[1]) * N_BYTES[ros] / 1000.0, rel=0.02)

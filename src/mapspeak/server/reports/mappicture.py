@@ -8,9 +8,10 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.robot import NavigationPart
-from mapspeak.server.text.wording import list_some, say_area
+from mapspeak.server.text.wording import list_some
 from mapspeak.server.text.world.look import Layer, MapLook, MapView
 from mapspeak.server.text.world.maps import NAVIGATION_PARTS
+from mapspeak.server.text.world.notices import say_area
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     EDGE_PX,

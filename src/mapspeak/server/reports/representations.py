@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.server.reports.mappicture import GREYS, draw_world, say_axes
-from mapspeak.server.text.wording import say_pose, say_warnings
+from mapspeak.server.text.wording import say_pose
 from mapspeak.server.text.world.look import MapView
+from mapspeak.server.text.world.notices import say_warnings
 from mapspeak.server.text.world.tables import describe_world
 from mapspeak.server.text.world.told import PICTURE, Told
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid

@@ -18,8 +18,9 @@ from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_places_left
-from mapspeak.server.text.wording import list_some, say_elsewhere, say_pose, say_pose_doubt
+from mapspeak.server.text.wording import list_some, say_pose, say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
+from mapspeak.server.text.world.notices import say_elsewhere
 from mapspeak.worldmodel.remembered import RememberedPlace, number_places
 
 MOST_NAMED = 12

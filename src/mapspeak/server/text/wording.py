@@ -5,31 +5,13 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
-from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory import SemanticMap
-from mapspeak.memory.events import tell_place
-from mapspeak.places.standing import find_standing_point
+from mapspeak.geometry import Point, Pose
 from mapspeak.robot import PoseDoubt
-from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.keepout import ClosedArea, ClosedFloor
-from mapspeak.worldmodel.model import WorldModel
+from mapspeak.spatial.rooms import Region
 
 Item = TypeVar("Item")
 
 LONGEST_NAME = 40
-DIRECTIONS = (
-    "ahead of it",
-    "ahead and to its left",
-    "to its left",
-    "behind and to its left",
-    "behind it",
-    "behind and to its right",
-    "to its right",
-    "ahead and to its right",
-)
-"""Eighths of a turn from the robot's heading, counter-clockwise."""
-HERE_M = 0.1
-
 POSE_DOUBTS = {
     PoseDoubt.NO_ANSWER: "the robot does not answer; state and pose are those heard last",
     PoseDoubt.NO_POSE: "the robot does not say where it is; the pose is the last one",
@@ -54,7 +36,7 @@ COMPASS = (
     "south",
     "south-east",
 )
-"""The same from the map's x axis on."""
+"""Eighths of a turn from the map's x axis, counter-clockwise."""
 
 KINDS = {"R": "a room", "C": "a corridor", "O": "an open space"}
 
@@ -78,33 +60,6 @@ def say_pose_doubt(doubt: PoseDoubt | None, age_s: float | None = None, silence:
     return " ".join(filter(None, (f"{doubt}: {old}{POSE_DOUBTS[doubt]}.", silence)))
 
 
-ASSUMED_RADIUS = (
-    "The robot does not tell its size. A radius of {:.2f} m is assumed: doors and goals may be too "
-    "tight for it, unless radius_m stands in robot.yaml."
-)
-
-
-def say_elsewhere(memory: SemanticMap) -> list[str]:
-    """Return how much is left out because they are of another map, if anything is."""
-    counts = ((len(memory.elsewhere), "place"), (memory.n_events_elsewhere, "event"))
-    left_out = [say_count(n, what) for n, what in counts if n]
-    if not left_out:
-        return []
-    is_one = sum(n for n, _ in counts) == 1
-    are = f"{' and '.join(left_out)} {'is' if is_one else 'are'}"
-    said = "remembered on another map, and how that lies to this one is not known."
-    return [f"{are} {said} Nothing of it is shown or found here."]
-
-
-def say_warnings(world: WorldModel) -> list[str]:
-    """Return what a reader of a map should know first: of the memory, and of the robot's pose."""
-    doubt = say_pose_doubt(world.pose_doubt)
-    of_pose = [f"The robot's pose is uncertain: {doubt}"] if doubt else []
-    of_memory = say_elsewhere(world.memory)
-    of_size = [ASSUMED_RADIUS.format(world.radius_m)] if world.is_radius_assumed else []
-    return [f"Warning: {warning}" for warning in (*world.warnings, *of_memory, *of_pose, *of_size)]
-
-
 def say_point(point: Point) -> str:
     """Return a point in metres."""
     return f"{_number(point.x)}, {_number(point.y)}"
@@ -120,26 +75,6 @@ def say_compass(heading_rad: float) -> str:
     return COMPASS[round(heading_rad / (math.tau / 8)) % 8]
 
 
-def say_obstruction(world: WorldModel, door: Door) -> str:
-    """Return why the robot does not get through a door, in a word or two."""
-    if door.width_m < 2 * world.radius_m:
-        return "too narrow"
-    floor = world.map.floor
-    if isinstance(floor, ClosedFloor):
-        closed = floor.find_area(door.place, within_m=world.radius_m)
-        if closed is not None:
-            return closed.closing
-    sides = (world.rooms.region(region_id) for region_id in door.region_ids)
-    is_any_reached = any(find_standing_point(world, region) for region in sides)
-    return "blocked" if is_any_reached else "out of reach"
-
-
-def say_area(area: ClosedArea) -> str:
-    """Return what a closed area is called; the words of an event are not the operator's: quoted."""
-    name = shorten(area.name)
-    return tell_place(name) if area.event_id else name
-
-
 def say_renamed(renamed: Mapping[str, str]) -> str:
     """Say what regions are called now that had another id; empty where none had."""
     return " ".join(
@@ -151,16 +86,6 @@ def say_renamed(renamed: Mapping[str, str]) -> str:
 def say_kind(region: Region) -> str:
     """Return what a region is."""
     return str(region.room_class).replace("_", " ")
-
-
-def say_direction(world: WorldModel, point: Point) -> str:
-    """Return where a point is as seen from the robot: "3.2 m straight, to its left"."""
-    away_m = world.robot.point.distance_to(point)
-    if away_m < HERE_M:
-        return "it stands there"
-    turn_rad = wrap_angle(world.robot.point.bearing_to(point) - world.robot.yaw_rad)
-    eighth = round(turn_rad / (math.tau / 8)) % 8
-    return f"{away_m:.1f} m straight, {DIRECTIONS[eighth]}"
 
 
 def shorten(text: str) -> str:

@@ -14,8 +14,8 @@ from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.reports.robot import GoalAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.moments import read_past
-from mapspeak.server.text.wording import say_elsewhere
 from mapspeak.server.text.world.descriptions import describe_place
+from mapspeak.server.text.world.notices import say_elsewhere
 from mapspeak.server.text.world.ways import describe_blocked, describe_measures
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session

@@ -17,15 +17,14 @@ from mapspeak.server.text.findings import say_conflict, say_finding, say_support
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import (
     join_words,
-    say_direction,
     say_kind,
-    say_obstruction,
     say_path,
     say_point,
     say_pose,
     shorten,
 )
 from mapspeak.server.text.world.maps import say_merits, say_size
+from mapspeak.server.text.world.notices import say_direction, say_obstruction
 from mapspeak.server.text.world.tables import say_walk
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
 from mapspeak.spatial.frontiers import Frontier

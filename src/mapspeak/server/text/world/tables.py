@@ -11,13 +11,10 @@ from mapspeak.server.text.wording import (
     build_table,
     join_words,
     list_some,
-    say_area,
     say_compass,
-    say_obstruction,
     say_path,
     say_point,
     say_pose,
-    say_warnings,
     shorten,
 )
 from mapspeak.server.text.world.look import (
@@ -36,6 +33,7 @@ from mapspeak.server.text.world.maps import (
     say_unsure,
     say_verdict,
 )
+from mapspeak.server.text.world.notices import say_area, say_obstruction, say_warnings
 from mapspeak.server.text.world.told import PICTURE, WAY, Told, tell_rows
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import CorridorWalk, Door, DoorSide, PassedDoor, Region, RoomClass

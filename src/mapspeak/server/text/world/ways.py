@@ -17,17 +17,10 @@ from mapspeak.places.relations.choosing import check_place, find_place, find_pla
 from mapspeak.places.standing import find_standing_point
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import (
-    build_table,
-    join_words,
-    say_obstruction,
-    say_path,
-    say_point,
-    say_warnings,
-    shorten,
-)
+from mapspeak.server.text.wording import build_table, join_words, say_path, say_point, shorten
 from mapspeak.server.text.world.drives import say_end
 from mapspeak.server.text.world.maps import say_refusal
+from mapspeak.server.text.world.notices import say_obstruction, say_warnings
 from mapspeak.server.text.world.tables import say_sizes
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel

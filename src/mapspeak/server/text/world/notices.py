@@ -1,0 +1,80 @@
+"""What is to be said of a world model before its rows: warnings, closures, where things lie."""
+
+import math
+
+from mapspeak.geometry import Point, wrap_angle
+from mapspeak.memory import SemanticMap
+from mapspeak.memory.events import tell_place
+from mapspeak.places.standing import find_standing_point
+from mapspeak.server.text.wording import say_count, say_pose_doubt, shorten
+from mapspeak.spatial.rooms import Door
+from mapspeak.worldmodel.keepout import ClosedArea, ClosedFloor
+from mapspeak.worldmodel.model import WorldModel
+
+ASSUMED_RADIUS = (
+    "The robot does not tell its size. A radius of {:.2f} m is assumed: doors and goals may be too "
+    "tight for it, unless radius_m stands in robot.yaml."
+)
+HERE_M = 0.1
+DIRECTIONS = (
+    "ahead of it",
+    "ahead and to its left",
+    "to its left",
+    "behind and to its left",
+    "behind it",
+    "behind and to its right",
+    "to its right",
+    "ahead and to its right",
+)
+"""Eighths of a turn from the robot's heading, counter-clockwise."""
+
+
+def say_warnings(world: WorldModel) -> list[str]:
+    """Return what a reader of a map should know first: of the memory, and of the robot's pose."""
+    doubt = say_pose_doubt(world.pose_doubt)
+    of_pose = [f"The robot's pose is uncertain: {doubt}"] if doubt else []
+    of_memory = say_elsewhere(world.memory)
+    of_size = [ASSUMED_RADIUS.format(world.radius_m)] if world.is_radius_assumed else []
+    return [f"Warning: {warning}" for warning in (*world.warnings, *of_memory, *of_pose, *of_size)]
+
+
+def say_elsewhere(memory: SemanticMap) -> list[str]:
+    """Return how much is left out because they are of another map, if anything is."""
+    counts = ((len(memory.elsewhere), "place"), (memory.n_events_elsewhere, "event"))
+    left_out = [say_count(n, what) for n, what in counts if n]
+    if not left_out:
+        return []
+    is_one = sum(n for n, _ in counts) == 1
+    are = f"{' and '.join(left_out)} {'is' if is_one else 'are'}"
+    said = "remembered on another map, and how that lies to this one is not known."
+    return [f"{are} {said} Nothing of it is shown or found here."]
+
+
+def say_obstruction(world: WorldModel, door: Door) -> str:
+    """Return why the robot does not get through a door, in a word or two."""
+    if door.width_m < 2 * world.radius_m:
+        return "too narrow"
+    floor = world.map.floor
+    if isinstance(floor, ClosedFloor):
+        closed = floor.find_area(door.place, within_m=world.radius_m)
+        if closed is not None:
+            return closed.closing
+    sides = (world.rooms.region(region_id) for region_id in door.region_ids)
+    is_any_reached = any(find_standing_point(world, region) for region in sides)
+    return "blocked" if is_any_reached else "out of reach"
+
+
+def say_area(area: ClosedArea) -> str:
+    """Return what a closed area is called; the words of an event are not the operator's: quoted."""
+    name = shorten(area.name)
+    return tell_place(name) if area.event_id else name
+
+
+def say_direction(world: WorldModel, point: Point) -> str:
+    """Return where a point is as seen from the robot: "3.2 m straight, to its left"."""
+    away_m = world.robot.point.distance_to(point)
+    if away_m < HERE_M:
+        return "it stands there"
+    turn_rad = wrap_angle(world.robot.point.bearing_to(point) - world.robot.yaw_rad)
+    eighth = round(turn_rad / (math.tau / 8)) % 8
+    return f"{away_m:.1f} m straight, {DIRECTIONS[eighth]}"
