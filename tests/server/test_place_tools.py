@@ -25,7 +25,7 @@ async def test_a_room_is_described_with_its_size_its_doors_and_the_way_there(
         text = text_of(await client.call_tool("describe_place", {"place": "R1"}))
     assert text.startswith("R1 is a room:")
     assert "Floor 8.5 m2" in text
-    assert "number 2 of 2 rooms, counted from the smallest" in text
+    assert "number 2 of 2 sure rooms, counted from the smallest" in text
     assert "Door D1 to R2: " in text
     assert "navigate_to takes R1" in text
 

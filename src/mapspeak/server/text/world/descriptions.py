@@ -17,6 +17,7 @@ from mapspeak.server.text.findings import say_conflict, say_finding, say_support
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import (
     join_words,
+    say_count,
     say_kind,
     say_path,
     say_point,
@@ -25,7 +26,7 @@ from mapspeak.server.text.wording import (
 )
 from mapspeak.server.text.world.maps import say_merits, say_size
 from mapspeak.server.text.world.notices import say_direction, say_obstruction
-from mapspeak.server.text.world.tables import say_walk
+from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
@@ -212,9 +213,14 @@ def _region_lines(world: WorldModel, region: Region) -> Iterator[str]:
 
 
 def _say_rank(world: WorldModel, region: Region) -> str:
-    same = [each for each in world.rooms.regions if each.room_class is region.room_class]
+    if region.room_class is RoomClass.CORRIDOR:
+        kind = "corridor"
+        same = [each for each in world.rooms.regions if each.room_class is RoomClass.CORRIDOR]
+    else:
+        kind, same = "sure room", list_sure_rooms(world)
+    if region not in same:
+        return f"as it may be part of another, none of the {say_count(len(same), kind)}"
     n_smaller = sum(each.floor_area_m2 < region.floor_area_m2 for each in same)
-    kind = say_kind(region)
     if len(same) == 1:
         return f"the only {kind}"
     return f"number {n_smaller + 1} of {len(same)} {kind}s, counted from the smallest"

@@ -370,6 +370,12 @@ def _say_size(world: WorldModel, room: Region) -> str:
     return f"{room.id} ({_say_floor(world, room)} m2)"
 
 
+def list_sure_rooms(world: WorldModel) -> list[Region]:
+    """Return the rooms and open spaces that are no parts of others, the smallest first."""
+    rooms = _rooms_by_size(world.rooms.regions)
+    return [room for room in rooms if world.rooms.find_doubtful_door(room) is None]
+
+
 def _rooms_by_size(regions: Sequence[Region]) -> list[Region]:
     rooms = (region for region in regions if region.room_class is not RoomClass.CORRIDOR)
     return sorted(rooms, key=lambda region: region.floor_area_m2)
