@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -43,6 +44,13 @@ def list_answers() -> Iterator[tuple[Recall, str]]:
 @pytest.mark.parametrize(("recalled", "said"), list(list_answers()))
 def test_advice_says_the_verdict_and_what_to_do_next(recalled: Recall, said: str) -> None:
     assert said in say_advice(recalled)
+
+
+def test_the_nearest_of_several_is_told_with_how_well_its_place_is_known() -> None:
+    recalled = ask(*LOOKS, NEAR)
+    first, *others = recalled.candidates
+    vague = replace(recalled, candidates=(replace(first, uncertainty_m=3.0), *others))
+    assert "T2 is the nearest by path, and its place is known to 3.0 m alone." in say_advice(vague)
 
 
 def test_evidence_is_a_name_with_the_metres_to_where_it_was_asked_for() -> None:

@@ -149,6 +149,8 @@ def _say_several(answer: Answer, first: RecallCandidate) -> str:
     is_named = answer.candidates[0].basis is Basis.NAME
     are = "are called so" if is_named else "are such a thing"
     nearest = f"; {first.id} is the nearest by path" if first.check.path_m is not None else ""
+    if nearest and (first.uncertainty_m or 0.0) > LOOK_AGAIN_M:
+        nearest += f", and its place is known to {first.uncertainty_m:.1f} m alone"
     return (
         f"Several: {answer.n_meant} {are}{nearest}. Choose by room, or ask which is meant, then "
         "take its id."
