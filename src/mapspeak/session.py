@@ -133,9 +133,7 @@ class Session:
         """Stop the robot when the client that sent it somewhere has gone away."""
         cause = Cause(code=CauseCode.CLIENT_GONE)
         self.drives.dismiss(cause, owner=client)
-        drive = self.drives.under_way
-        is_drivers = self.drives.is_busy and (drive is None or drive.caller.owner == client)
-        if is_drivers or client in self._started.owners:
+        if client in self.drives.owners or client in self._started.owners:
             logger.warning("The client hung up during its drive: stopping the robot.")
             await self.drives.stop(cause)
 

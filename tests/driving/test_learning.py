@@ -183,18 +183,26 @@ def test_pauses_begin_anew_when_the_last_was_long_ago(store: SemanticMapStore) -
     assert len(store.read_events()) == 1
 
 
-async def test_the_next_drive_knows_of_the_door_too(tmp_path: Path) -> None:
+def open_session(folder: Path) -> tuple[FakeRobot, SemanticMapStore, Session]:
     robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
-    store = SemanticMapStore(tmp_path / "places.yaml")
-    session = Session(
-        robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
-    )
+    store = SemanticMapStore(folder / "places.yaml")
+    guard = make_guard(folder, Policy(), clock=WallClock(NOW))
+    return robot, store, Session(robot, store, lease_s=60.0, guard=guard)
+
+
+async def end_drive(robot: FakeRobot, session: Session, goal: Point, state: GoalState) -> None:
+    """Sends the robot somewhere; the drive ends before the north door."""
     with session.drives.preparing() as ticket:
-        drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
+        drive = await session.drives.start(Pose(goal.x, goal.y), place="R2", ticket=ticket)
     robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
     assert drive.robot_goal_id is not None
-    robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
+    robot.ended[drive.robot_goal_id] = GoalStatus(state=state)
     await session.drives.report()
+
+
+async def test_the_next_drive_knows_of_the_door_too(tmp_path: Path) -> None:
+    robot, store, session = open_session(tmp_path)
+    await end_drive(robot, session, EAST, GoalState.BLOCKED)
 
     with session.drives.preparing():
         await session.find_goal(place="R2", x=None, y=None, yaw_deg=None)
@@ -203,22 +211,9 @@ async def test_the_next_drive_knows_of_the_door_too(tmp_path: Path) -> None:
 
 
 async def test_a_drive_tells_of_a_door_though_another_has_ended_since(tmp_path: Path) -> None:
-    robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
-    store = SemanticMapStore(tmp_path / "places.yaml")
-    session = Session(
-        robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
-    )
-    with session.drives.preparing() as ticket:
-        drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
-    robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
-    assert drive.robot_goal_id is not None
-    robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
-    await session.drives.report()
-    with session.drives.preparing() as ticket:
-        turn = await session.drives.start(robot.pose, place="here", ticket=ticket)
-    assert turn.robot_goal_id is not None
-    robot.ended[turn.robot_goal_id] = GoalStatus(state=GoalState.ARRIVED)
-    await session.drives.report()
+    robot, store, session = open_session(tmp_path)
+    await end_drive(robot, session, EAST, GoalState.BLOCKED)
+    await end_drive(robot, session, BEFORE_NORTH_DOOR, GoalState.ARRIVED)
 
     await session.fetch_world_model()
     await session.fetch_world_model()
@@ -227,18 +222,9 @@ async def test_a_drive_tells_of_a_door_though_another_has_ended_since(tmp_path: 
 
 
 async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path: Path) -> None:
-    robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
-    store = SemanticMapStore(tmp_path / "places.yaml")
-    session = Session(
-        robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
-    )
+    robot, store, session = open_session(tmp_path)
     await session.fetch_world_model()
-    with session.drives.preparing() as ticket:
-        drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
-    robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
-    assert drive.robot_goal_id is not None
-    robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
-    await session.drives.report()
+    await end_drive(robot, session, EAST, GoalState.BLOCKED)
 
     world = await session.fetch_world_model()
     again = await session.fetch_world_model()

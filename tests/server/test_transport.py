@@ -137,6 +137,17 @@ async def test_a_drive_ends_when_its_client_is_gone(tmp_path: Path) -> None:
     assert session.drives.under_way is None
 
 
+@pytest.mark.parametrize(("client", "n_stops"), [("another", 0), ("mine", 1)])
+async def test_a_goal_that_is_being_checked_is_given_up_with_its_own_client_alone(
+    tmp_path: Path, client: str, n_stops: int
+) -> None:
+    robot = FakeRobot(two_rooms())
+    session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
+    with calling(Caller(session="mine")), session.drives.preparing():
+        await build_server(session).note_hang_up(client)
+    assert robot.n_stops == n_stops
+
+
 @pytest.mark.parametrize(
     ("headers", "status"),
     [

@@ -55,7 +55,7 @@ class DriveBook:
         self._drives: dict[str, Drive] = {}
         self._n_started = 0
         self._n_stops = 0
-        self._n_preparing = 0
+        self._preparing: list[str] = []
         self._starting = anyio.Lock()
 
     @property
@@ -81,7 +81,13 @@ class DriveBook:
     @property
     def is_busy(self) -> bool:
         """True while a drive may be under way, waits its turn or is being prepared."""
-        return bool(self._open()) or self._owed.goal_id is not None or self._n_preparing > 0
+        return bool(self._open()) or self._owed.goal_id is not None or bool(self._preparing)
+
+    @property
+    def owners(self) -> frozenset[str]:
+        """Whose the drive under way is, and the goals that are being prepared."""
+        drive = self.under_way
+        return frozenset([*self._preparing, *(() if drive is None else (drive.caller.owner,))])
 
     @property
     def n_stops(self) -> int:
@@ -96,11 +102,12 @@ class DriveBook:
     @contextmanager
     def preparing(self) -> Generator[int]:
         """Mark that a goal is being checked, and return the ticket to start its drive with."""
-        self._n_preparing += 1
+        owner = current_caller().owner
+        self._preparing.append(owner)
         try:
             yield self._n_stops
         finally:
-            self._n_preparing -= 1
+            self._preparing.remove(owner)
 
     async def start(
         self,
