@@ -295,6 +295,15 @@ def test_nothing_is_remembered_in_an_empty_memory(vectors: TextVectors | None) -
     assert not is_one_kind(answer)
 
 
+@pytest.mark.parametrize("request_", ["tool used for a fire", "the tool for fire"])
+def test_the_tool_for_a_fire_is_the_extinguisher_before_the_hose_by_words_alone(
+    request_: str,
+) -> None:
+    names = ("fire hose reel", "fire extinguisher", "fire blanket", "table")
+    entries = [Entry(id=str(i), kind=EntryKind.THING, name=name) for i, name in enumerate(names)]
+    assert EntryIndex(entries).find(request_).candidates[0].entry.name == "fire extinguisher"
+
+
 def test_a_letter_after_a_name_tells_places_apart() -> None:
     aisles = [Entry(id=f"aisle {x}", kind=EntryKind.PLACE, name=f"aisle {x}") for x in "AB"]
     index = EntryIndex(aisles)

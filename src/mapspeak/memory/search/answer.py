@@ -224,7 +224,7 @@ class Thresholds:
     there: Chance
 
 
-SURE_RATIO = 0.9
+SURE_RATIO = 0.93
 """The first candidate is said to be the one meant where it is so likely."""
 REMEMBERED_RATIO = 0.65
 """A request is said not to be remembered where it is less likely."""
