@@ -16,7 +16,7 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.driving.drivemonitor import NEEDS_NO_STOP, PATIENCE_S, DriveMonitor, Look, OwedStop
-from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_failed
+from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose
@@ -74,11 +74,6 @@ class DriveBook:
         return tuple(each for each in self._drives.values() if each.final)
 
     @property
-    def failed(self) -> tuple[Drive, ...]:
-        """The drives that failed, the latest first, where no later one got there."""
-        return find_failed(self._drives.values())
-
-    @property
     def is_busy(self) -> bool:
         """True while a drive may be under way, waits its turn or is being prepared."""
         return bool(self._open()) or self._owed.goal_id is not None or bool(self._preparing)
@@ -130,7 +125,6 @@ class DriveBook:
             LinkError: The robot cannot be reached, or its pose is unknown.
             PolicyError: The robot must not drive there.
         """
-        caller = current_caller()
         async with self._starting:
             busy = await self._find_busy()
             await self._monitor.find_robot()
@@ -141,18 +135,18 @@ class DriveBook:
                 place=place,
                 robot_goal_id=None,
                 started_s=self._robot.now_s,
-                caller=caller,
+                caller=current_caller(),
                 ticket=ticket,
                 purpose=purpose,
             )
-            is_other = busy is not None and busy.caller.owner != caller.owner
+            is_other = busy is not None and busy.caller.owner != drive.caller.owner
             when_busy = self._when_busy if is_other else WhenBusy.REPLACE
             if busy is None or when_busy is WhenBusy.REPLACE:
                 drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
                 self._end_all(Cause(code=CauseCode.REPLACED), but=drive)
                 return drive
             if when_busy is WhenBusy.WAIT:
-                self.dismiss(Cause(code=CauseCode.REPLACED), owner=caller.owner)
+                self.dismiss(Cause(code=CauseCode.REPLACED), owner=drive.caller.owner)
                 return self._keep(drive)
             raise GoalError(
                 f"{busy.goal_id} to {busy.place} is under way.",
@@ -176,8 +170,7 @@ class DriveBook:
             drive = self._drives.get(drive.goal_id, drive)
         if drive.final is not None and drive.ended_at is None and self._monitor.knows_place(look):
             drive = self._keep(replace(drive, ended_at=self._monitor.here.point))
-        is_owed = self._owed.goal_id == drive.goal_id
-        return self._monitor.tell(drive, look, is_stop_owed=is_owed)
+        return self._monitor.tell(drive, look, is_stop_owed=self._owed.goal_id == drive.goal_id)
 
     async def watch(self) -> None:
         """Look after the drive under way, and start the next one; to be called now and then."""

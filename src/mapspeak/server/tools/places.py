@@ -5,6 +5,7 @@ from typing import Annotated
 from mcp_types import CallToolResult, TextContent
 from pydantic import Field
 
+from mapspeak.driving.drivereport import find_failed
 from mapspeak.errors import GoalError
 from mapspeak.memory.search.answer import EntryKind
 from mapspeak.places.recall.asking import RecallQuery, recall
@@ -107,7 +108,7 @@ class PlaceTools:
             return describe_blocked(
                 world,
                 events=session.recall_events(),
-                failed=session.drives.failed,
+                failed=find_failed(session.drives.ended),
                 held_by=None if session.guard is None else session.guard.hold.read(),
                 now=session.find_wall_time(),
                 now_s=session.robot.now_s,
