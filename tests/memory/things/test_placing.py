@@ -92,6 +92,32 @@ def test_nothing_is_seen_through_a_wall_that_furniture_hides_on_both_sides() -> 
     assert clock.position.x + clock.uncertainty_m < 7.0
 
 
+ROW_AT_THE_WALL = """
+    ##################################################
+    #................................................#
+    #................................................#
+    #................................................#
+    #................................................#
+    #.............################...................#
+    #.............################...................#
+    #.............################...................#
+    ##################################################
+"""
+
+
+def test_what_hangs_behind_a_row_of_pallets_at_the_wall_is_seen_over_them() -> None:
+    alarm, place = 8.5, Pose(1.0, 0.9, 0.0)
+    bearing_rad = math.atan2(0.25 - place.y, alarm - place.x)
+    mark = Landmark(
+        label="fire alarm", bearing_rad=bearing_rad, range_m=7.5, bearing_from="detector"
+    )
+    seen = Waypoint(name="a", pose=place, safety_landmarks=(mark,))
+    grid = grid_from_text(ROW_AT_THE_WALL, resolution_m=0.25)
+    (thing,) = find_things(SemanticMap(waypoints=(seen,)), grid).things
+    assert thing.position is not None
+    assert thing.position.x == pytest.approx(alarm, abs=1.0)
+
+
 def test_a_thing_right_before_the_robot_has_a_place() -> None:
     mark = Landmark(label="chair", bearing_rad=-1.628, bearing_from="picture")
     place = Waypoint(name="a", pose=Pose(4.78, 0.63, 0.0), functional_landmarks=(mark,))

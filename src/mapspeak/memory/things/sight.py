@@ -32,6 +32,8 @@ LATTICE_M = 0.2
 """The side of the cells in which a thing is looked for; finer than any view can tell."""
 FURNITURE_M = 2.5
 """What is no longer than this and touches no wall stands free, and one may see over it."""
+ROW_M = 6.0
+"""Nor is a row of it at a wall longer: one sees over pallets and benches that rooms end at."""
 HIDDEN_M = 1.0
 """Of a wall, furniture on both sides hides no longer piece."""
 BODY_M = 0.3
@@ -90,7 +92,7 @@ class SightMap:
 def build_sight_map(grid: OccupancyGrid) -> SightMap:
     """Make a map ready: what blocks sight, and where things may stand."""
     # Nobody sees into furniture, so that its inside is unknown, too.
-    cleared = build_cleared(grid)
+    cleared = build_cleared(grid, block_m=ROW_M)
     walls = grid.occupied & ~_small_parts(grid, grid.occupied) & ~cleared
     blocked = walls | (grid.unknown & ~_small_parts(grid, grid.unknown) & ~cleared)
     blocked |= _run_on(blocked, grid)

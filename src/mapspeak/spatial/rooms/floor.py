@@ -48,11 +48,11 @@ class Floor:
     clearance_m: NDArray[np.float32]
 
 
-def build_floor(raster: Raster) -> Floor:
-    """Return the floor with its furniture cleared away."""
+def build_floor(raster: Raster, *, block_m: float = SETTINGS.block_length_m) -> Floor:
+    """Return the floor with its furniture cleared away, where it is no longer than told."""
     directions = find_wall_directions(raster.occupied)
     wall, obstacle = find_walls(raster, directions)
-    block, behind = find_blocks(raster, wall)
+    block, behind = find_blocks(raster, wall, longest_m=block_m)
     wall, obstacle = (part & (1 - block) | behind for part in (wall, obstacle))
     free = raster.free | block
     occupied = (raster.occupied & (1 - block)) | behind
@@ -70,10 +70,14 @@ def build_floor(raster: Raster) -> Floor:
     )
 
 
-def build_cleared(grid: OccupancyGrid) -> Mask:
-    """Return True for the cells of a map that are floor, furniture or small unseen pockets."""
+def build_cleared(grid: OccupancyGrid, *, block_m: float) -> Mask:
+    """Return True for the cells of a map that are floor, furniture or small unseen pockets.
+
+    Args:
+        block_m: What is longer is no furniture.
+    """
     raster = build_raster(grid)
-    return raster.on_grid(build_floor(raster).floor.astype(np.int32)) > 0
+    return raster.on_grid(build_floor(raster, block_m=block_m).floor.astype(np.int32)) > 0
 
 
 def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:

@@ -44,15 +44,17 @@ Counts = NDArray[np.intp]
 Numbers = NDArray[np.int32]
 
 
-def find_blocks(raster: Raster, wall: Picture) -> tuple[Picture, Picture]:
+def find_blocks(raster: Raster, wall: Picture, *, longest_m: float) -> tuple[Picture, Picture]:
     """Return 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
         wall: 1 on presumed wall; only wall continues behind furniture.
+        longest_m: The floor around furniture is at most this far, along the walls and square to
+            them.
     """
     solid = 1 - drop_specks(raster.free, _SPECK_M2 / raster.cell_area_m2)
     joined = find_fixed(solid)
-    sizes = _Sizes(solid, joined, raster.cell_size_m)
+    sizes = _Sizes(solid, joined, raster.cell_size_m, longest_m)
     block, behind = _find_blocks(solid, wall, sizes, joined)
     return block, behind & (1 - block)
 
@@ -68,14 +70,16 @@ class _Sizes:
         tip: Largest distance from the middle of a wall to floor.
     """
 
-    def __init__(self, solid: Picture, fixed: Picture, cell_size_m: float) -> None:
+    def __init__(
+        self, solid: Picture, fixed: Picture, cell_size_m: float, longest_m: float
+    ) -> None:
         self.depth = round(SETTINGS.block_depth_m / cell_size_m) | 1
         self.thick = round(SETTINGS.block_thickness_m / cell_size_m) | 1
         wall = SETTINGS.block_ratio * _find_wall_thickness(
             solid, fixed, self.thick, 2 * SETTINGS.oblique_length_m / cell_size_m
         )
         self.thin = max(round(SETTINGS.block_depth_m / cell_size_m) + 2, round(wall)) | 1
-        self.long = round(SETTINGS.block_length_m / cell_size_m)
+        self.long = round(longest_m / cell_size_m)
         self.stub = round(_STUB_M / cell_size_m) | 1
         self.tip = round(SETTINGS.tip_m / cell_size_m)
         self.rim = round(_RIM_M / cell_size_m)
