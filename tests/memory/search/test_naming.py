@@ -105,6 +105,19 @@ def test_what_the_head_of_a_label_says_is_sure_with_a_model(label: str, request_
 
 
 @pytest.mark.parametrize(
+    "request_",
+    [
+        "I'd like you to find the ladder",
+        "Let's go to the ladder",
+        "I've got to find a ladder",
+        "would you kindly help me find the ladder",
+    ],
+)
+def test_what_people_say_before_a_name_makes_it_no_less_sure(request_: str) -> None:
+    assert ask("ladder", request_, way="words").verdict is Verdict.FOUND
+
+
+@pytest.mark.parametrize(
     ("request_", "name", "is_so"),
     [
         ("fire extinguisher", "foam fire extinguisher", True),

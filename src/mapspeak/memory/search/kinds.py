@@ -14,7 +14,13 @@ from mapspeak.memory.policy import find_head, words_of
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import Entry, EntryKind, MatchField
 from mapspeak.memory.search.meaningindex import LESS_FOR_COMMON, TextVectors
-from mapspeak.memory.search.wordindex import MOST_KEPT, Texts, content_stems, split_words
+from mapspeak.memory.search.wordindex import (
+    MOST_KEPT,
+    Texts,
+    content_stems,
+    split_words,
+    without_endings,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,6 +299,6 @@ def denies(request: str) -> bool:
 
 def without_opening(request: str) -> str:
     """Return a request without the words that people say before they come to what they mean."""
-    words = [shown for shown, _ in split_words(request)]
+    words = [shown for shown, _ in split_words(without_endings(request))]
     first = next((i for i, word in enumerate(words) if word.lower() not in words_of("opening")), 0)
     return " ".join(words[first:])

@@ -72,6 +72,11 @@ def _without_denied(field: MatchField, text: str) -> str:
     return _DENIED.sub(" ", text) if field in SENTENCES else text
 
 
+def without_endings(text: str) -> str:
+    """Return a text without what is contracted: "I like" of "I'd like"."""
+    return _ENDING.sub("", text)
+
+
 def without_accents(word: str) -> str:
     """Return a text in small letters without accents."""
     letters = unicodedata.normalize("NFKD", word.casefold())
@@ -80,7 +85,7 @@ def without_accents(word: str) -> str:
 
 def content_words(text: str) -> Iterator[tuple[str, str]]:
     """Return the words that matter, without "the", "where's" and "take me to"."""
-    words, fillers = list(split_words(_ENDING.sub("", text))), words_of("fillers")
+    words, fillers = list(split_words(without_endings(text))), words_of("fillers")
     for number, (shown, word) in enumerate(words, 1):
         # "Aisle A" is not any aisle.
         tells_apart = len(word) == 1 and 1 < number == len(words)
