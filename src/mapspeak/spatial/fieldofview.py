@@ -256,24 +256,35 @@ def trace_outlines(grid: OccupancyGrid, cells: Mask, *, least_m: float) -> list[
     ]
 
 
-def new_wall_by_heading(grid: OccupancyGrid, shown: Mask, places: FloatArray) -> FloatArray:
-    """Return how much wall that no picture shows lies in each heading, in metres.
+@dataclass(frozen=True, slots=True, eq=False)
+class WallsByHeading:
+    """The walls that rays from places end at, of shape (places, N_HEADINGS).
 
-    A wall counts as wide as it looks, which is no more than it is long.
-
-    Args:
-        shown: From `mask_pictured`.
-        places: Points, shape (n, 2).
-
-    Returns:
-        Shape (n, N_HEADINGS), of the sector around each heading alone.
+    Attributes:
+        walls: The last free cell of each ray, or NO_WALL.
+        metres: How wide each wall looks, which is no more than it is long.
     """
-    sectors = [
-        np.where((walls != NO_WALL) & ~shown.ravel()[walls], metres, 0.0)
-        for walls, metres in _follow_from(grid, places)
-    ]
-    widths_m = np.concatenate(sectors) if sectors else np.zeros((0, N_HEADINGS))
-    return widths_m * (math.tau / N_HEADINGS)
+
+    walls: IntArray
+    metres: FloatArray
+
+    def measure_new(self, shown: Mask) -> FloatArray:
+        """Return how much wall that no picture shows lies in each heading, in metres.
+
+        Args:
+            shown: From `mask_pictured`.
+        """
+        is_new = (self.walls != NO_WALL) & ~shown.ravel()[self.walls]
+        return np.where(is_new, self.metres, 0.0)
+
+
+def find_walls_by_heading(grid: OccupancyGrid, places: FloatArray) -> WallsByHeading:
+    """Find the walls around some places, shape (n, 2)."""
+    found = list(_follow_from(grid, places))
+    none = np.zeros((0, N_HEADINGS))
+    walls = np.concatenate([none.astype(np.intp), *(each for each, _ in found)])
+    metres = np.concatenate([none, *(each for _, each in found)])
+    return WallsByHeading(walls, metres * (math.tau / N_HEADINGS))
 
 
 def _follow_from(grid: OccupancyGrid, places: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:

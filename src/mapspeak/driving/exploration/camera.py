@@ -1,7 +1,7 @@
 """Driving for pictures: which walls no picture shows yet, and where to stop for one."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -12,6 +12,7 @@ import numpy as np
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.exploration.trips import Target, TripContext, name_turn, turn_to
+from mapspeak.driving.routes.ordering import order_shortest
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import PictureBook
@@ -29,26 +30,23 @@ from mapspeak.safety import ApprovalScope
 from mapspeak.spatial.fieldofview import (
     CameraView,
     find_half_view_rad,
+    find_walls_by_heading,
     heading_rad,
     mask_pictured,
     measure_pictured,
-    new_wall_by_heading,
     sum_by_heading,
 )
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
 DRIVE_WORTH_M = 0.7
 """So much new wall all around a place is worth a drive there."""
-STOP_M = 1.0
-"""What a stop costs beside the way to it."""
-NEAR_FIRST = 1.5
-"""Above 1, what is near comes before what shows more: it would else be returned to."""
-DETOUR_M = 2.0
-"""What is farther off the way to a frontier waits until later."""
+MOST_ORDERED = 9
+"""Goals farther off do not come first; each costs a field of distances."""
 SAME_SPOT_M = 0.15
 SAME_WAY_RAD = math.radians(12.0)
 """A picture taken so near to another shows no more, whatever single rays meet."""
@@ -73,44 +71,73 @@ def is_view_due(robot: Pose, views: Sequence[CameraView]) -> bool:
 def find_camera_target(
     world: WorldModel,
     views: Sequence[CameraView],
-    frontier: Frontier | None,
+    frontiers: Sequence[Frontier],
     *,
     is_closed: Callable[[Point], bool],
 ) -> Target | None:
-    """Find the pose to take the next picture in; None where the frontier comes first.
+    """Find the pose to take the next picture in, or the frontier on the way there.
 
-    First comes what can be seen by a turn in place, then most new wall for the way.
+    First comes what can be seen by a turn in place. Then the robot takes the shortest way past the
+    frontiers and the stops that show what is left, so that it need not come back.
 
     Args:
         views: The pictures so far, the latest last.
-        frontier: Where the exploration would go next.
+        frontiers: Where the exploration may go.
         is_closed: Whether a drive to a place has just failed.
+
+    Returns:
+        None where no stop is left, whatever frontiers are.
     """
     shown = mask_pictured(world.grid, views)
     half_rad = find_half_view_rad(views)
     here = world.robot.point
-    around_m = new_wall_by_heading(world.grid, shown, np.array([[here.x, here.y]]))[0]
-    if sum_by_heading(around_m, half_rad).max() >= TURN_WORTH_M and not is_closed(here):
+
+    def can_be(target: Target) -> bool:
+        return not is_closed(target.pose.point) and not _is_taken(target.pose, views)
+
+    walls = find_walls_by_heading(world.grid, np.array([[here.x, here.y]]))
+    around_m = walls.measure_new(shown)[0]
+    if sum_by_heading(around_m, half_rad).max() >= TURN_WORTH_M:
         target = _target(here, around_m, half_rad)
-        if not _is_taken(target.pose, views):
+        if can_be(target):
             return target
-    points, ways_m = spread_places(world)
-    if frontier is not None:
-        # What lies on the way to the frontier, or hardly beside it.
-        goal = frontier.pose.point
-        on_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
-        ways_m = np.maximum(ways_m + on_m - frontier.distance_m, 0.0)
-        is_beside = ways_m <= DETOUR_M
-        points, ways_m = points[is_beside], ways_m[is_beside]
-    new_m = new_wall_by_heading(world.grid, shown, points)
-    total_m = new_m.sum(axis=1)
-    rates = np.where(total_m >= DRIVE_WORTH_M, total_m / (ways_m + STOP_M) ** NEAR_FIRST, 0.0)
-    for index in np.argsort(-rates, kind="stable")[: np.count_nonzero(rates)]:
-        point = Point(*points[index].tolist())
-        target = _target(point, new_m[index], half_rad)
-        if not is_closed(point) and not _is_taken(target.pose, views):
-            return target
-    return None
+    stops = list(_cover_walls(world, shown, half_rad, can_be))
+    beside = [Target(id=each.id, pose=each.pose, frontier=each) for each in frontiers]
+    return _choose_first(world, [*stops, *beside]) if stops else None
+
+
+def _cover_walls(
+    world: WorldModel, shown: Mask, half_rad: float, can_be: Callable[[Target], bool]
+) -> Iterator[Target]:
+    """Return stops that show all the wall worth a drive: greedily, who shows most first."""
+    points, _ = spread_places(world)
+    walls = find_walls_by_heading(world.grid, points)
+    is_left = np.ones(len(points), dtype=np.bool_)
+    while True:
+        new_m = walls.measure_new(shown)
+        total_m = np.where(is_left, new_m.sum(axis=1), 0.0)
+        index = int(total_m.argmax()) if len(points) else 0
+        if not len(points) or total_m[index] < DRIVE_WORTH_M:
+            return
+        is_left[index] = False
+        target = _target(Point(*points[index].tolist()), new_m[index], half_rad)
+        if can_be(target):
+            yield target
+            all_around = CameraView(target.pose, half_view_rad=math.pi)
+            shown = shown | mask_pictured(world.grid, [all_around])
+
+
+def _choose_first(world: WorldModel, goals: Sequence[Target]) -> Target:
+    """Return the first of the goals near by on the shortest way past them."""
+
+    def way_m(field: DistanceField, goal: Target) -> float:
+        told_m = field.distance_to(goal.pose.point)
+        return math.inf if told_m is None else told_m
+
+    near = sorted(goals, key=lambda goal: way_m(world.distances, goal))[:MOST_ORDERED]
+    fields = [world.distances, *(world.map.distances_from(goal.pose.point) for goal in near)]
+    legs_m = np.array([[way_m(field, goal) for goal in near] for field in fields])
+    return near[order_shortest(legs_m, is_end_fixed=False)[0]]
 
 
 def _is_taken(pose: Pose, views: Sequence[CameraView]) -> bool:

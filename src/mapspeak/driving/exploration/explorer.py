@@ -188,13 +188,13 @@ class Explorer:
             return self._trips.blocked.is_closed(point, world.grid)
 
         frontiers = [each for each in world.frontiers.frontiers if not is_closed(each.pose.point)]
-        frontier = self._pick(frontiers, world) if frontiers else None
         if self._bounds.for_camera:
             views = self._site.pictures.views
-            target = find_camera_target(world, views, frontier, is_closed=is_closed)
+            target = find_camera_target(world, views, frontiers, is_closed=is_closed)
             if target is not None:
                 return target
-        if frontier is not None:
+        if frontiers:
+            frontier = self._pick(frontiers, world)
             return Target(id=frontier.id, pose=frontier.pose, frontier=frontier)
         retry = self._trips.blocked.worth_another_try(world.grid)
         nearest = min(retry, key=lambda each: _path_m(world, each), default=None)
