@@ -12,7 +12,7 @@ import numpy as np
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.exploration.trips import Target, TripContext, name_turn, turn_to
-from mapspeak.driving.routes.ordering import order_shortest
+from mapspeak.driving.ordering import order_shortest
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import PictureBook
