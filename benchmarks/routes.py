@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.figure import Figure
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, away
-from mapspeak.driving.ordering import RouteOrder
+from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan, plan_route
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapspeak.driving.ordering import MOST_EXACT, measure_order, order_shortest
+from mapspeak.driving.routes.ordering import MOST_EXACT, measure_order, order_shortest
 from mapspeak.spatial.grid import FloatArray
 
 SEEDS = st.integers(0, 10_000)

@@ -12,7 +12,6 @@ import numpy as np
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.exploration.trips import Target, TripContext, name_turn, turn_to
-from mapspeak.driving.ordering import order_shortest
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import PictureBook
@@ -38,7 +37,7 @@ from mapspeak.spatial.fieldofview import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray, Mask
-from mapspeak.spatial.paths import DistanceField
+from mapspeak.spatial.paths.rounds import find_shortest_rounds, find_ways_between
 from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 0.5
@@ -46,7 +45,7 @@ TURN_WORTH_M = 0.5
 DRIVE_WORTH_M = 0.7
 """So much new wall all around a place is worth a drive there."""
 MOST_ORDERED = 9
-"""Goals farther off do not come first; each costs a field of distances."""
+"""What is farther off does not come first, and all orders of these are looked at."""
 SAME_SPOT_M = 0.15
 SAME_WAY_RAD = math.radians(12.0)
 """A picture taken so near to another shows no more, whatever single rays meet."""
@@ -129,15 +128,12 @@ def _cover_walls(
 
 def _choose_first(world: WorldModel, goals: Sequence[Target]) -> Target:
     """Return the first of the goals near by on the shortest way past them."""
-
-    def way_m(field: DistanceField, goal: Target) -> float:
-        told_m = field.distance_to(goal.pose.point)
-        return math.inf if told_m is None else told_m
-
-    near = sorted(goals, key=lambda goal: way_m(world.distances, goal))[:MOST_ORDERED]
-    fields = [world.distances, *(world.map.distances_from(goal.pose.point) for goal in near)]
-    legs_m = np.array([[way_m(field, goal) for goal in near] for field in fields])
-    return near[order_shortest(legs_m, is_end_fixed=False)[0]]
+    ways_m = [(world.path_m(goal.pose.point), goal) for goal in goals]
+    reached = [(way_m, goal) for way_m, goal in ways_m if way_m is not None]
+    near = sorted(reached, key=lambda each: each[0])[:MOST_ORDERED]
+    between_m = find_ways_between(world.distances, [goal.pose.point for _, goal in near])
+    rounds_m = find_shortest_rounds(np.array([way_m for way_m, _ in near]), between_m)
+    return near[int(rounds_m.argmin())][1]
 
 
 def _is_taken(pose: Pose, views: Sequence[CameraView]) -> bool:

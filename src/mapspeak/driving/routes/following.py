@@ -14,7 +14,7 @@ import anyio
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.trips import TripContext
-from mapspeak.driving.ordering import RouteOrder
+from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan, StopState, plan_route
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose

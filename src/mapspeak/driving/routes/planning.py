@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from mapspeak.driving.ordering import RouteOrder, order_shortest
+from mapspeak.driving.routes.ordering import RouteOrder, order_shortest
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import GoalCheck, say_refusal

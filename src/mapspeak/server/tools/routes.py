@@ -7,8 +7,8 @@ from mcp.server.mcpserver import Context, Image
 from mcp_types import CallToolResult, ContentBlock, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.driving.ordering import RouteOrder
 from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
+from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import RouteAnswer

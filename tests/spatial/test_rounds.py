@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.frontiers.ranking import find_shortest_rounds, find_ways_between
 from mapspeak.spatial.paths import distances_from
+from mapspeak.spatial.paths.rounds import find_shortest_rounds, find_ways_between
 
 
 @given(seed=st.integers(0, 2**32 - 1), n_stops=st.integers(1, 6))
