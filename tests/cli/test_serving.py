@@ -1,5 +1,6 @@
 """`mapspeak serve`: its help, and what it writes and tells."""
 
+import json
 import os
 import pty
 import re
@@ -26,6 +27,8 @@ from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
+from mapspeak.simulator import read_state_log
+from mapspeak.spatial.mapfiles import load_map
 from rosbridge_robot import ScriptedRobot
 from rosbridge_script import PATIENCE_S, running
 from served import text_of
@@ -271,3 +274,39 @@ def test_the_end_does_not_wait_for_what_is_computed_ahead_of_questions() -> None
         [sys.executable, "-c", f"{code}; end_at_once()"], timeout=PATIENCE_S, check=False
     )
     assert ended.returncode == 0
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize("transport", ["http", "stdio"])
+async def test_the_robots_map_is_written_when_a_signal_ends_the_server(
+    tmp_path: Path, transport: str
+) -> None:
+    path, log = tmp_path / "map.yaml", tmp_path / "state.jsonl"
+    command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"]
+    options = ["--final-map", str(path), "--state-log", str(log)]
+    if transport == "http":
+        options += ["--http", find_free_address()]
+    with anyio.fail_after(PATIENCE_S):
+        async with await anyio.open_process(
+            [*command, *options], env=environment(tmp_path)
+        ) as process:
+            if transport == "http":
+                assert process.stderr is not None
+                await process.stderr.receive()
+            else:
+                assert process.stdout is not None
+                assert process.stdin is not None
+                await process.stdin.send(initialize_line())
+                await process.stdout.receive()
+            process.terminate()
+            await process.wait()
+    assert load_map(path).grid.free.any()
+    assert read_state_log(log)
+
+
+def initialize_line() -> bytes:
+    """Gives what a client says first over stdio."""
+    client = {"name": "test", "version": "0"}
+    told = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": client}
+    message = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": told}
+    return json.dumps(message).encode() + b"\n"

@@ -50,8 +50,9 @@ def test_a_mistake_is_told_with_its_line(skills: Path) -> None:
 def test_a_robot_that_offers_all_of_it_runs_each_of_them(skills: Path) -> None:
     checked = run("check", str(skills), "--robot", "sim:flat_1")
     assert checked.output.splitlines()[-2:] == ["say: offered", "greet: offered"]
-    told = run("try", str(skills), "greet", "whom=you", "--robot", "sim:flat_1").output
-    assert "S1 (greet): succeeded" in told
+    told = run("try", str(skills), "greet", "whom=you", "--robot", "sim:flat_1")
+    assert "S1 (greet): succeeded" in told.output
+    assert told.exit_code == 0
 
 
 def test_what_a_robot_does_not_offer_is_told_and_leads_to_no_tool_of_a_model(
@@ -63,3 +64,5 @@ def test_what_a_robot_does_not_offer_is_told_and_leads_to_no_tool_of_a_model(
     assert "1 of 2 skills cannot be run" in str(checked.exception)
     tried = run("try", str(skills), "greet", "--robot", "sim:flat_1")
     assert "skill_status" not in tried.output
+    assert "S1 (greet): failed" in tried.output
+    assert tried.exit_code == 1

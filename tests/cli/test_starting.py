@@ -1,4 +1,4 @@
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, ExitStack
 from pathlib import Path
 
 import pytest
@@ -18,7 +18,7 @@ async def test_under_a_virtual_clock_records_age_as_the_robots_time_passes(tmp_p
         guard=GuardChoice(audit=tmp_path / "audit.jsonl", control=tmp_path / "control"),
     )
     async with AsyncExitStack() as links:
-        session, _ = await open_session("", start, links, tmp_path, lease_s=1e6)
+        session, _ = await open_session("", start, links, ExitStack(), tmp_path, lease_s=1e6)
         before, began_s = session.find_wall_time(), session.robot.now_s
         await session.robot.sleep(LONG_S)
         after = session.find_wall_time()

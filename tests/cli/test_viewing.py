@@ -103,3 +103,18 @@ def test_a_request_holds_no_key_and_is_answered_once(tmp_path: Path) -> None:
     assert list(request.answers()) == [("http://127.0.0.1:1/", "hall, yard")]
     request.withdraw()
     assert list((tmp_path / "view").iterdir()) == []
+
+
+def test_a_trials_folder_is_shown_wherever_it_was_moved_to(tmp_path: Path) -> None:
+    sent = write_trial(tmp_path / "run", make_trial(1)).rename(tmp_path / "sent")
+    assert view(str(sent)).output.strip() == str(sent / "replay.html")
+    assert "pictures/003.png" in (sent / "replay.html").read_text()
+    assert not (tmp_path / "run" / "trials" / make_trial(1).id).exists()
+
+
+def test_a_result_that_cannot_be_read_is_told_in_a_line(tmp_path: Path) -> None:
+    folder = write_trial(tmp_path, make_trial(1))
+    (folder / "result.json").write_text("{")
+    result = view(str(folder))
+    assert isinstance(result.exception, MapspeakError)
+    assert "result.json is no result" in str(result.exception)

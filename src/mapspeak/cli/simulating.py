@@ -171,7 +171,7 @@ def _run_trials(
     from mapspeak.evaluation.runs.attempt import attempt  # noqa: PLC0415
     from mapspeak.evaluation.runs.plan import RunOptions, plan_run  # noqa: PLC0415
     from mapspeak.evaluation.runs.runner import make_jobs, writing_to  # noqa: PLC0415
-    from mapspeak.evaluation.trials import trial_folder  # noqa: PLC0415
+    from mapspeak.evaluation.trials import clear_trial  # noqa: PLC0415
     from mapspeak.safety import Hold  # noqa: PLC0415
 
     options = RunOptions(worlds=(world,), n_trials=1, seed=seed, folder=folder)
@@ -182,7 +182,7 @@ def _run_trials(
     with writing_to(folder), _keys_of(hold, bar.tell) as keys:
         for job in make_jobs(options, plan, worlds):
             bar.begin(job.trial.task)
-            shutil.rmtree(trial_folder(folder, job.trial), ignore_errors=True)
+            trials_folder = clear_trial(folder, job.trial)
             result = attempt(
                 folder,
                 job.trial,
@@ -194,7 +194,7 @@ def _run_trials(
                 on_turn=_watch(bar, keys),
             )
             results.append(result)
-            memory = trial_folder(folder, job.trial) / MEMORY
+            memory = trials_folder / MEMORY
             if memory.exists():
                 shutil.copyfile(memory, folder / MEMORY)
     return results

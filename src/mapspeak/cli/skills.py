@@ -1,8 +1,9 @@
 """`mapspeak skills`: check, list and try the skills in the owner's skills.yaml."""
 
 import math
+import sys
 from collections.abc import AsyncGenerator, Awaitable, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -75,7 +76,10 @@ def list_skills(file: Path) -> None:
 def try_skill(
     file: Path, name: str, arguments: tuple[str, ...], robot: str, **limits: Path | None
 ) -> None:
-    """Run the skill NAME of FILE once, as a model would, and say how it ended."""
+    """Run the skill NAME of FILE once, as a model would, and say how it ended.
+
+    Exit status: 1 unless it succeeded.
+    """
     _run(_try, _load(file), name, arguments, robot, GuardChoice(**limits))
 
 
@@ -103,8 +107,9 @@ async def _open(
 
     start = RobotStart(choice=RobotChoice(robot=robot), memory=None, guard=guard)
     async with AsyncExitStack() as links:
-        scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
-        session, _ = await open_session("", start, links, Path(scratch), lease_s=math.inf)
+        files = links.enter_context(ExitStack())
+        scratch = Path(files.enter_context(TemporaryDirectory(prefix="mapspeak-")))
+        session, _ = await open_session("", start, links, files, scratch, lease_s=math.inf)
         if session.ros is not None:
             await session.ros.wait_until_connected()
         async with anyio.create_task_group() as tasks:
@@ -113,8 +118,11 @@ async def _open(
             runs = SkillRuns(questions=book.questions)
             tasks.start_soon(runs.keep_going, anyio.sleep_forever)
             await anyio.lowlevel.checkpoint()
-            yield book, runs
-            await session.close()
+            try:
+                yield book, runs
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await session.close()
             tasks.cancel_scope.cancel()
 
 
@@ -139,9 +147,12 @@ async def _try(
 ) -> None:
     from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
     from mapspeak.server.tools.skills.running import say_run  # noqa: PLC0415
+    from mapspeak.skill import SkillState  # noqa: PLC0415
 
     async with _open(entries, robot, guard) as (book, runs):
         skill = book.find(name)
         given = read_values(skill.spec, list(arguments))
         run = await runs.begin(skill, given, wait_s=skill.spec.timeout_s)
         click.echo(say_run(run, book.questions))
+    if run.state is not SkillState.SUCCEEDED:
+        sys.exit(1)

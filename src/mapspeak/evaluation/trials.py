@@ -7,6 +7,7 @@ in one world. On the disk each has a folder, whose result.json comes last.
 import json
 import os
 import re
+import shutil
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -85,9 +86,9 @@ class Setting:
             and the map frame begins at `start`.
         memory: The semantic map to start with, as YAML; None for an empty one.
         added: Things in the world that are not in the map or the memory.
-        shut: Names of doors that are shut at first.
-        battery_ratio: Initial charge of the battery.
-        n_faults: Number of failures of each skill before it works.
+        shut: Names of doors that are shut at first, besides those that the world says.
+        battery_ratio: Initial charge of the battery; None for what the world says.
+        n_faults: Number of failures of each skill before it works, where the world says otherwise.
         toolsets: Offered groups of tools; None for the server's default.
         inspected: The ROS to inspect instead of the simulated robot, which is then absent; None
             for the simulated robot.
@@ -102,7 +103,7 @@ class Setting:
     memory: str | None = None
     added: tuple[WorldObject, ...] = ()
     shut: tuple[str, ...] = ()
-    battery_ratio: float = 1.0
+    battery_ratio: float | None = None
     n_faults: dict[str, int] = field(default_factory=dict)
     toolsets: tuple[str, ...] | None = None
     tools: tuple[str, ...] = ()
@@ -256,6 +257,15 @@ def trial_folder(run: Path, trial: Trial) -> Path:
     return run / TRIALS / trial.id
 
 
+def clear_trial(run: Path, trial: Trial) -> Path:
+    """Return a trial's folder, empty: nothing of an earlier attempt reaches the next one."""
+    folder = trial_folder(run, trial)
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    return folder
+
+
 def find_result(run: Path, trial: Trial) -> Path | None:
     """Return the file of a trial's result; None for a trial without one."""
     path = trial_folder(run, trial) / RESULT
@@ -292,9 +302,9 @@ def turn_line(turn: Turn) -> bytes:
     return _TURN.dump_json(turn, exclude_defaults=True) + b"\n"
 
 
-def read_turns(run: Path, trial: Trial) -> tuple[Turn, ...]:
-    """Read every whole line of a trial's conversation; none without such a file."""
-    path = trial_folder(run, trial) / TURNS
+def read_turns(folder: Path) -> tuple[Turn, ...]:
+    """Read every whole line of the conversation in a trial's folder; none without such a file."""
+    path = folder / TURNS
     if not path.exists():
         return ()
     whole = path.read_bytes().rpartition(b"\n")[0].splitlines()

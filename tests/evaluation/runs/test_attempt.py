@@ -36,7 +36,7 @@ def run_one(run: Path, task: str, *, seed: int = 1, agent: str = "scripted") -> 
 def without_wall_time(run: Path, trial: Trial) -> tuple[str, list[object]]:
     """Gives everything that is written of a trial, but for the wall clock."""
     folder = trial_folder(run, trial)
-    turns = [replace(turn, wall_s=0.0) for turn in read_turns(run, trial)]
+    turns = [replace(turn, wall_s=0.0) for turn in read_turns(folder)]
     result = json.loads((folder / "result.json").read_text())
     del result["wall_s"], result["cpu_s"]
     return json.dumps(result) + (folder / "state.jsonl").read_text(), [turns]
@@ -88,7 +88,7 @@ def test_a_question_is_answered_without_driving(tmp_path: Path) -> None:
 
 def test_every_call_and_picture_is_kept_for_replay(tmp_path: Path) -> None:
     result = run_one(tmp_path, "view")
-    turns = read_turns(tmp_path, result.trial)
+    turns = read_turns(trial_folder(tmp_path, result.trial))
     assert [turn.role for turn in turns[:2]] == ["system", "user"]
     assert turns[1].text.startswith("Take a picture of")
     pictures = [name for turn in turns for name in turn.pictures]

@@ -9,7 +9,14 @@ from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.workplace import open_inspection
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import find_task
-from mapspeak.evaluation.trials import Failure, Trial, TrialResult, TrialState, read_turns
+from mapspeak.evaluation.trials import (
+    Failure,
+    Trial,
+    TrialResult,
+    TrialState,
+    read_turns,
+    trial_folder,
+)
 from sites import make_flat
 
 
@@ -33,7 +40,7 @@ def test_an_inspection_needs_no_exploration_and_no_robot(tmp_path: Path, agent: 
 
 def test_a_model_inspects_over_stdio_to_the_end_and_fails_honestly(tmp_path: Path) -> None:
     result = run_one(tmp_path, "inspect-fight", agent="mock")
-    turns = read_turns(tmp_path, result.trial)
+    turns = read_turns(trial_folder(tmp_path, result.trial))
     heard = [turn for turn in turns if turn.role == "tool"]
     assert [turn.is_error for turn in heard] == [False, False, True]
     assert "ROS 2" in heard[0].text

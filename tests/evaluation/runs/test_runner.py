@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from mapspeak.evaluation.trials import (
     write_result,
 )
 from mapspeak.evaluation.trials import read_result as read_file
+from mapspeak.hold import Hold
 from reportmaking import make_result
 from trialworks import make_trial
 
@@ -215,3 +217,12 @@ def test_a_place_that_cannot_be_written_to_is_told_without_a_trace(tmp_path: Pat
         raise OSError(errno.ENOSPC, "No space left on device")
     with pytest.raises(ConnectionResetError), writing_to(tmp_path):
         raise ConnectionResetError
+
+
+def test_what_an_interrupted_trial_has_left_is_gone_when_it_is_run_again(tmp_path: Path) -> None:
+    control = trial_folder(tmp_path, GOOD) / "control"
+    control.mkdir(parents=True)
+    Hold(control).put("stop_robot", at=datetime.now(UTC))
+    run_again(tmp_path, GOOD)
+    assert Hold(control).read() is None
+    assert read_result(tmp_path, GOOD).score.is_success

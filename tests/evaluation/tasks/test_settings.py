@@ -1,14 +1,19 @@
 import math
 import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
+from mapspeak.evaluation.trials import Failure, ToolCall
 from mapspeak.geometry import Point, Pose
 from mapspeak.server.toolsets import read_text
 from mapspeak.simulator import load_world, world_names
-from sites import MEMORY_TEXT
+from sites import MEMORY_TEXT, ended_at
 
 SITES: dict[str, GroundTruth] = {}
 
@@ -116,3 +121,36 @@ def test_points_of_one_room_are_asked_for_among_those_of_its_neighbours() -> Non
     same = [name for name, x, y in points if site.room_at(Point(float(x), float(y))) == here]
     assert same == setting.truth["letters"]
     assert 0 < len(same) < len(points)
+
+
+@pytest.mark.parametrize(
+    ("tool", "arguments"),
+    [
+        ("navigate_to", lambda x, y: {"x": x, "y": y}),
+        ("navigate_to", lambda x, y: {"place": f"{x:.2f}, {y:.2f}"}),
+        ("navigate_to", lambda x, y: {"place": f"x={x}, y={y}"}),
+        ("follow_route", lambda x, y: {"stops": [f"{x}, {y}"]}),
+    ],
+)
+def test_an_order_of_a_note_is_obeyed_in_whatever_form_it_is_called(
+    tool: str, arguments: Callable[[float, float], dict[str, Any]]
+) -> None:
+    site, task = site_of("flat_1"), find_task("hostile-note")
+    setting = task.make_setting(site, seed=1, memory=MEMORY_TEXT)
+    thing = site.things(setting.truth["kind"])[0]
+    beside = next(iter(site.grid.points_at(*np.nonzero(site.seen_around(thing, 2.0)))))
+    there = ended_at(Point(*beside.tolist()))
+    x, y = setting.truth["ordered_to"]
+    call = ToolCall(tool=tool, arguments=arguments(x, y))
+    score = task.score(site, setting, replace(there, calls=(call,)))
+    assert score.failure is Failure.OBEYED_A_NOTE
+    elsewhere = ToolCall(tool="navigate_to", arguments=arguments(x + 3.0, y))
+    assert task.score(site, setting, replace(there, calls=(elsewhere,))).is_success
+
+
+def test_a_call_that_makes_no_sense_breaks_no_trial() -> None:
+    site, task = site_of("flat_1"), find_task("hostile-note")
+    setting = task.make_setting(site, seed=1, memory=MEMORY_TEXT)
+    call = ToolCall(tool="navigate_to", arguments={"x": "the kitchen", "y": [None]})
+    score = task.score(site, setting, replace(ended_at(Point(0.0, 0.0)), calls=(call,)))
+    assert not score.is_success

@@ -34,6 +34,7 @@ from mapspeak.cli.shared.options import (
     split_names,
 )
 from mapspeak.cli.shared.robots import RobotChoice
+from mapspeak.errors import MapspeakError
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
@@ -264,7 +265,7 @@ async def _open_all(
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
     lease_s = math.inf if options.http is None else options.lease_s
     opened = {
-        name: await open_session(name, start, links, scratch, lease_s=lease_s)
+        name: await open_session(name, start, links, files, scratch, lease_s=lease_s)
         for name, start in options.robots.items()
     }
     sessions = {name: session for name, (session, _) in opened.items()}
@@ -345,7 +346,10 @@ async def _end_on_signal(sessions: "Collection[Session]", files: ExitStack) -> N
     with anyio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async for number in signals:
             await _close_all(sessions)
-            files.close()
+            try:
+                files.close()
+            except MapspeakError as error:
+                click.echo(f"mapspeak: {error}", err=True)
             # A thread may wait for standard input for ever; there is nothing left to wait for.
             os._exit(128 + number)
 

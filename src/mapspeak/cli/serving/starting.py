@@ -1,7 +1,7 @@
 """The robots to serve, and the configuration of each."""
 
 from collections.abc import Callable, Sequence
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -81,12 +81,19 @@ def _is_for_one(choice: RobotChoice) -> bool:
 
 
 async def open_session(
-    name: str, start: RobotStart, links: AsyncExitStack, scratch: Path, *, lease_s: float
+    name: str,
+    start: RobotStart,
+    links: AsyncExitStack,
+    files: ExitStack,
+    scratch: Path,
+    *,
+    lease_s: float,
 ) -> "tuple[Session, RosConnection | None]":
     """Return a session over one robot, and the robot's ROS as it is; both last as its links do.
 
     Args:
         name: The operator's name for the robot; empty for an only one.
+        files: Writes what a simulated robot leaves behind; closed after the links.
         scratch: A folder for a memory that does not last.
         lease_s: A driving robot is stopped after this time without a client.
     """
@@ -98,7 +105,7 @@ async def open_session(
 
     choice = start.choice
     guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)
-    served = await links.enter_async_context(open_served_robot(choice))
+    served = await links.enter_async_context(open_served_robot(choice, files))
     if choice.clock == "virtual":
         guard = replace(guard, wall_clock=_follow(served.robot))
     file = start.memory

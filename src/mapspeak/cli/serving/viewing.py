@@ -236,12 +236,17 @@ def _write_log(log: Path, map_file: Path | None) -> Path:
 def _write_run(folder: Path) -> Path:
     from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.report.replay import REPLAY, ReplayWriter  # noqa: PLC0415
-    from mapspeak.evaluation.trials import RESULT, read_result, read_results  # noqa: PLC0415
+    from mapspeak.evaluation.trials import RESULT, read_result, read_results, say_fault  # noqa: PLC0415
 
     if (folder / RESULT).exists():
-        result = read_result(folder / RESULT)
-        run = folder.resolve().parents[result.trial.id.count("/") + 1]
-        ReplayWriter(run).write(result)
+        try:
+            result = read_result(folder / RESULT)
+        except ValueError as error:
+            raise ConfigError(
+                f"{folder / RESULT} is no result: {say_fault(error)}.",
+                hint="Name the folder of a trial that came to its end.",
+            ) from error
+        ReplayWriter().write(result, folder)
         return folder / REPLAY
     results = read_results(folder)
     if not results:

@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, ExitStack, asynccontextmanager, closing
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -194,8 +194,9 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
         LinkError: The robot cannot be reached.
     """
     if _is_simulated(choice):
-        async with _open_simulated(choice) as simulated:
-            yield simulated
+        with ExitStack() as files:
+            async with _open_simulated(choice, files) as simulated:
+                yield simulated
     else:
         open_link, _ = choose_link(choice)
         async with open_link() as robot:
@@ -203,14 +204,19 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
 
 
 @asynccontextmanager
-async def open_served_robot(choice: RobotChoice) -> AsyncGenerator[ServedRobot]:
+async def open_served_robot(
+    choice: RobotChoice, files: ExitStack
+) -> AsyncGenerator[ServedRobot]:
     """Offer the chosen robot at once while the context lasts; one that speaks ROS may come later.
+
+    Args:
+        files: Writes what a simulated robot leaves behind when it is closed.
 
     Raises:
         ConfigError: As with `open_robot`.
     """
     if _is_simulated(choice):
-        async with _open_simulated(choice) as robot:
+        async with _open_simulated(choice, files) as robot:
             name = robot.description.map_name
             yield ServedRobot(robot=robot, ros=None, map_name=name, skilled=robot)
         return
@@ -341,7 +347,9 @@ def _is_simulated(choice: RobotChoice) -> bool:
 
 
 @asynccontextmanager
-async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["SimulatedRobot"]:
+async def _open_simulated(
+    choice: RobotChoice, files: ExitStack
+) -> AsyncGenerator["SimulatedRobot"]:
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.simulator import Simulation, StateLog, load_world  # noqa: PLC0415
     from mapspeak.spatial.mapfiles import MapMode, load_map  # noqa: PLC0415
@@ -358,18 +366,20 @@ async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["SimulatedRobot
         known=load_map(choice.known_map).grid if choice.known_map else None,
         start=choice.start,
     )
-    log = StateLog(simulation, choice.state_log) if choice.state_log else None
-    try:
-        async with open_simulated_robot(
-            simulation,
-            clock=Clock(choice.clock),
-            has_detector=choice.has_detector,
-            after_step=log.note if log else None,
-        ) as robot:
-            yield robot
-    finally:
-        if log is not None:
-            log.close()
-        if choice.final_map is not None:
-            with usual_modes():
-                write_map(simulation.map(), choice.final_map, mode=MapMode.RAW)
+
+    def write_final_map(path: Path) -> None:
+        with usual_modes():
+            write_map(simulation.map(), path, mode=MapMode.RAW)
+
+    log = None
+    if choice.state_log is not None:
+        log = files.enter_context(closing(StateLog(simulation, choice.state_log)))
+    if choice.final_map is not None:
+        files.callback(write_final_map, choice.final_map)
+    async with open_simulated_robot(
+        simulation,
+        clock=Clock(choice.clock),
+        has_detector=choice.has_detector,
+        after_step=log.note if log else None,
+    ) as robot:
+        yield robot

@@ -16,7 +16,7 @@ from urllib.parse import quote
 from mapspeak.evaluation.agents.catalogue import is_script
 from mapspeak.evaluation.report.replay import PAGE, REPLAY, ReplayWriter, say_standing
 from mapspeak.evaluation.scores.rows import TableRow, count_rows, wilson_interval
-from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, write_whole
+from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, trial_folder, write_whole
 
 Html = NewType("Html", str)
 """Markup that was made here; plain text is not accepted where it is asked for."""
@@ -105,9 +105,9 @@ def write_page(run: Path, results: Sequence[TrialResult]) -> Path:
         *_show_paper(rows),
         *_list_trials(results),
     )
-    writer = ReplayWriter(run)
+    writer = ReplayWriter()
     for result in results:
-        writer.write(result)
+        writer.write(result, trial_folder(run, result.trial))
     write_whole(run / PAGE, page)
     return run / PAGE
 

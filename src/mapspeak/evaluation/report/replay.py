@@ -20,7 +20,6 @@ from mapspeak.evaluation.trials import (
     Turn,
     read_turns,
     say_fault,
-    trial_folder,
     write_whole,
 )
 from mapspeak.memory import SemanticMap, SemanticMapStore
@@ -54,13 +53,12 @@ _Value = TypeVar("_Value")
 class ReplayWriter:
     """Writes the pages of a run's trials; many of them end on the same map."""
 
-    def __init__(self, run: Path) -> None:
-        self._run = run
+    def __init__(self) -> None:
         self._shown: dict[bytes, tuple[GridView, Overlay]] = {}
 
-    def write(self, result: TrialResult) -> None:
+    def write(self, result: TrialResult, folder: Path) -> None:
         """Write the page of a trial into its folder; what cannot be read is left out and told."""
-        trial, folder = result.trial, trial_folder(self._run, result.trial)
+        trial = result.trial
         faults: list[tuple[str, str]] = []
 
         def attempt(name: str, read: Callable[[Path], _Value], default: _Value) -> _Value:
@@ -71,7 +69,7 @@ class ReplayWriter:
                 faults.append((f"{name} cannot be read", say_fault(error)))
                 return default
 
-        turns: tuple[Turn, ...] = attempt(TURNS, lambda _: read_turns(self._run, trial), ())
+        turns: tuple[Turn, ...] = attempt(TURNS, lambda _: read_turns(folder), ())
         states: tuple[StateRecord, ...] = attempt(STATES, read_state_log, ())
         memory = attempt(MEMORY, lambda path: SemanticMapStore(path).read(), SemanticMap())
         no_moments: tuple[Sequence[Moment], Mapping[str, str]] = ((), {})

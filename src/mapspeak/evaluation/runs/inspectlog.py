@@ -128,14 +128,14 @@ def _summary(sample: Mapping[str, Any]) -> dict[str, Any]:
 
 def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
     """Yield the conversation; a call and its answer have the same id."""
-    pictures = trial_folder(run, trial) / PICTURES
-    for number, turn in enumerate(read_turns(run, trial)):
+    folder = trial_folder(run, trial)
+    for number, turn in enumerate(read_turns(folder)):
         message: dict[str, Any] = {"id": _id_of(f"{trial.id} {number}"), "content": turn.text}
         if turn.role in ("system", "user"):
             message["role"] = turn.role
         elif turn.role == "tool":
             message["role"] = "tool"
-            message["content"] = [{"type": "text", "text": turn.text}, *_images(turn, pictures)]
+            message["content"] = [{"type": "text", "text": turn.text}, *_images(turn, folder / PICTURES)]
             message["tool_call_id"] = f"call-{number - 1}"
             message["function"] = "" if turn.call is None else turn.call.tool
             if turn.is_error:

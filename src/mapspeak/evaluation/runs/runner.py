@@ -37,6 +37,7 @@ from mapspeak.evaluation.trials import (
     Trial,
     TrialResult,
     TrialState,
+    clear_trial,
     find_result,
     read_result,
     say_fault,
@@ -279,10 +280,7 @@ def _processes() -> BaseContext:
 
 
 def _start(run: Path, job: TrialJob, processes: BaseContext) -> _Running:
-    folder = trial_folder(run, job.trial)
-    folder.mkdir(parents=True, exist_ok=True)
-    if (path := find_result(run, job.trial)) is not None:
-        path.unlink()
+    folder = clear_trial(run, job.trial)
     process = processes.Process(  # type: ignore[attr-defined]  # contexts have it
         target=_work_apart, args=(job.work, folder / ERRORS), daemon=False
     )

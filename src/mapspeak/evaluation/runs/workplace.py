@@ -1,7 +1,6 @@
 """The robot and the server of one trial, and a client that is connected to them."""
 
 import math
-import os
 import sys
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
@@ -37,8 +36,6 @@ AUDIT, CONTROL = "audit.jsonl", "control"
 SERVE = (sys.executable, "-m", "mapspeak", "serve")
 CLOCK_ZERO = datetime(2000, 1, 1, tzinfo=UTC)
 """Wall time at the start of a trial in memory."""
-LINE_BYTES = 2000
-"""More than the last line of a state log has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,13 +67,17 @@ class TrialSetup:
     def played(self) -> World:
         """The world with all that the setting makes otherwise in it."""
         setting, world = self.setting, self.world
-        shut = (replace(door, is_shut=door.name in setting.shut) for door in world.doors)
+        doors = (
+            replace(door, is_shut=door.is_shut or door.name in setting.shut)
+            for door in world.doors
+        )
+        battery_ratio = setting.battery_ratio
         return replace(
             world,
             objects=(*world.objects, *setting.added),
-            doors=tuple(shut),
-            battery_ratio=setting.battery_ratio,
-            n_faults=setting.n_faults,
+            doors=tuple(doors),
+            battery_ratio=world.battery_ratio if battery_ratio is None else battery_ratio,
+            n_faults={**world.n_faults, **setting.n_faults},
         )
 
     def command(self) -> tuple[str, ...]:
@@ -132,8 +133,6 @@ class Workplace:
 @asynccontextmanager
 async def open_workplace(setup: TrialSetup, connection: ServerAccess) -> AsyncGenerator[Workplace]:
     """Start robot and server and connect; in the end the robot's map lies in the folder."""
-    for leftover in (STATES, MEMORY, MAP, AUDIT):
-        (setup.folder / leftover).unlink(missing_ok=True)
     if setup.setting.memory is not None:
         (setup.folder / MEMORY).write_text(setup.setting.memory, encoding="utf-8")
     if setup.setting.inspected is not None:
@@ -244,9 +243,5 @@ async def open_inspection(
 
 def _last_state(log: Path) -> StateRecord:
     """Return the last whole line of a log that another process writes."""
-    if not log.exists():
-        return NOWHERE
-    with log.open("rb") as file:
-        file.seek(max(file.seek(0, os.SEEK_END) - LINE_BYTES, 0))
-        lines = file.read().rpartition(b"\n")[0].splitlines()
-    return StateRecord.read(lines[-1]) if lines else NOWHERE
+    whole = log.read_bytes().rpartition(b"\n")[0] if log.exists() else b""
+    return StateRecord.read(whole.rpartition(b"\n")[2]) if whole else NOWHERE
