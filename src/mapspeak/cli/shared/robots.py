@@ -204,9 +204,7 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
 
 
 @asynccontextmanager
-async def open_served_robot(
-    choice: RobotChoice, files: ExitStack
-) -> AsyncGenerator[ServedRobot]:
+async def open_served_robot(choice: RobotChoice, files: ExitStack) -> AsyncGenerator[ServedRobot]:
     """Offer the chosen robot at once while the context lasts; one that speaks ROS may come later.
 
     Args:

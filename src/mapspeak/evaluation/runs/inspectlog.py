@@ -135,7 +135,10 @@ def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
             message["role"] = turn.role
         elif turn.role == "tool":
             message["role"] = "tool"
-            message["content"] = [{"type": "text", "text": turn.text}, *_images(turn, folder / PICTURES)]
+            message["content"] = [
+                {"type": "text", "text": turn.text},
+                *_images(turn, folder / PICTURES),
+            ]
             message["tool_call_id"] = f"call-{number - 1}"
             message["function"] = "" if turn.call is None else turn.call.tool
             if turn.is_error:

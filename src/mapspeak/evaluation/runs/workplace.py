@@ -68,8 +68,7 @@ class TrialSetup:
         """The world with all that the setting makes otherwise in it."""
         setting, world = self.setting, self.world
         doors = (
-            replace(door, is_shut=door.is_shut or door.name in setting.shut)
-            for door in world.doors
+            replace(door, is_shut=door.is_shut or door.name in setting.shut) for door in world.doors
         )
         battery_ratio = setting.battery_ratio
         return replace(
