@@ -92,7 +92,7 @@ def test_a_low_battery_and_a_full_one_take_turns() -> None:
         find_task("errand-low-battery").make_setting(site, seed=seed, memory=MEMORY_TEXT)
         for seed in (0, 1)
     )
-    assert low.battery_ratio < 0.3 < full.battery_ratio
+    assert (low.battery_ratio or 1.0) < 0.3 < (full.battery_ratio or 0.0)
     assert low.truth["steps"][0]["deed"] == "dock: "
     assert "dock: " not in [step["deed"] for step in full.truth["steps"]]
 
