@@ -13,11 +13,11 @@ from mapspeak.simulator.simulation import (
     read_state_log,
 )
 from mapspeak.simulator.truth import (
+    EyeLevel,
     MeasuredRoom,
     TrueFloor,
     Truth,
     is_in_sight,
-    slice_at_eye_level,
 )
 from mapspeak.simulator.worlds.world import (
     BODY_RADIUS_M,
@@ -41,6 +41,7 @@ __all__ = [
     "TICK_S",
     "BodyVelocity",
     "Equipment",
+    "EyeLevel",
     "LidarScan",
     "MeasuredRoom",
     "Simulation",
@@ -57,6 +58,5 @@ __all__ = [
     "load_world",
     "measure_shares_in_view",
     "read_state_log",
-    "slice_at_eye_level",
     "world_names",
 ]

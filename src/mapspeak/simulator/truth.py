@@ -4,8 +4,8 @@ Cells of truth grids lie in the map frame, which starts where the robot starts, 
 borders with the cells of the robot's own map.
 """
 
-import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.robot.gridmap import CELL_SIZE_M
 from mapspeak.simulator.robot.lidar import (
-    BEAM_ANGLES_RAD,
     BEAM_DIRECTIONS,
     MAX_RANGE_M,
     measure_ranges,
@@ -106,17 +105,22 @@ class TrueFloor:
 
         As on every map made by a LiDAR, a cell that a surface touches is solid.
         """
+        is_solid = self._rasterise(least_ratio=_TOUCHED_RATIO).cells == _SOLID
+        is_seen = self.see_from(self.viewpoints)
+        cells = np.where(is_solid, _SOLID, np.where(is_seen, _FREE, UNKNOWN))
+        return _grid(cells, self.solid.origin.point)
+
+    def see_from(self, points: Iterable[Point]) -> Mask:
+        """Return True at the cells of `solid` that an ideal LiDAR sees from any of some points."""
         is_seen = np.zeros(self.solid.cells.shape, dtype=np.uint8)
-        for point in self.viewpoints:
+        for point in points:
             world_from_base = self._world.start @ Pose(point.x, point.y)
             ranges = np.minimum(measure_ranges(self._solids.edges, world_from_base), MAX_RANGE_M)
             star = (BEAM_DIRECTIONS * ranges[:, None] + (point.x, point.y)) / CELL_SIZE_M
             origin = self.solid.origin
             placed = star - (origin.x / CELL_SIZE_M, origin.y / CELL_SIZE_M) - 0.5
             cv2.fillPoly(is_seen, [np.round(placed * 64).astype(np.int32)], 1, shift=6)
-        is_solid = self._rasterise(least_ratio=_TOUCHED_RATIO).cells == _SOLID
-        cells = np.where(is_solid, _SOLID, np.where(is_seen > 0, _FREE, UNKNOWN))
-        return _grid(cells, self.solid.origin.point)
+        return is_seen > 0
 
     @cached_property
     def viewpoints(self) -> list[Point]:
@@ -192,36 +196,66 @@ def _grid(cells: NDArray[np.integer[Any]], origin: Point) -> OccupancyGrid:
 EYE_BAND_M = (1.05, 1.15)
 """Obstacles as high as the camera, which hide what lies behind them."""
 OWN_SIZE_M = 0.5
-"""The thing itself, and the wall it hangs on, do not hide it."""
-SIDEWAYS_M = (-0.2, -0.1, 0.0, 0.1, 0.2)
+"""A thing itself, and what it stands in, do not hide it."""
+IN_WALL_M = 0.05
+"""The surface of the wall that a thing hangs on does not hide it."""
+SIDEWAYS_M = (0.0, -0.1, 0.1, -0.2, 0.2)
 """A thing has some width: it is in sight when any part of it is."""
 
 
-def slice_at_eye_level(world: World) -> Slice:
-    """Return what hides things: all that is as high as the camera."""
-    return slice_world(world, low_m=EYE_BAND_M[0], high_m=EYE_BAND_M[1])
+class EyeLevel:
+    """A world as high as the camera: walls and things that hide what lies behind them."""
+
+    def __init__(self, world: World) -> None:
+        low_m, high_m = EYE_BAND_M
+        self._walls = slice_world(replace(world, objects=()), low_m=low_m, high_m=high_m)
+        self._things = slice_world(replace(world, walls=(), doors=()), low_m=low_m, high_m=high_m)
+
+    def find_sights(self, thing: WorldObject, places: FloatArray) -> Mask:
+        """Return True for the places from which a thing is in sight, unless all of it is hidden.
+
+        What hangs on a wall is hidden from everywhere behind that wall.
+
+        Args:
+            places: In the world's own frame, shape (n, 2).
+        """
+        at = np.array([thing.pose.x, thing.pose.y])
+        to_thing = at - places
+        away_m = np.maximum(np.hypot(to_thing[:, 0], to_thing[:, 1]), 1e-9)
+        aside = np.stack([-to_thing[:, 1], to_thing[:, 0]], axis=1) / away_m[:, None]
+        reach_m = float(away_m.max(initial=0.0)) + max(SIDEWAYS_M)
+        walls, things = (
+            each.near(thing.pose.point, reach_m=reach_m).edges
+            for each in (self._walls, self._things)
+        )
+        is_seen = np.zeros(len(places), dtype=np.bool_)
+        for sideways_m in SIDEWAYS_M:
+            left = np.flatnonzero(~is_seen)
+            parts = at + sideways_m * aside[left]
+            is_hidden = _cross(walls, places[left], parts, stop_before_m=IN_WALL_M)
+            is_hidden |= _cross(things, places[left], parts, stop_before_m=OWN_SIZE_M)
+            is_seen[left] = ~is_hidden
+        if find_kind(thing.kind).is_wall_hung:
+            is_seen &= place_points(thing.pose.inverse(), places)[:, 0] > 0
+        return is_seen
 
 
-def is_in_sight(
-    world: World, place: Point, thing: WorldObject, *, hiding: Slice | None = None
-) -> bool:
-    """Return True unless obstacles as high as the camera hide all of a thing from a place.
+def is_in_sight(world: World, place: Point, thing: WorldObject) -> bool:
+    """Return True unless all of a thing is hidden from a place of the world's own frame."""
+    return bool(EyeLevel(world).find_sights(thing, np.array([[place.x, place.y]]))[0])
 
-    What hangs on a wall is hidden from everywhere behind that wall.
 
-    Args:
-        place: In the world's own frame.
-        hiding: The world sliced at eye level, if available; else it is sliced here.
-    """
-    if find_kind(thing.kind).is_wall_hung and thing.pose.inverse().transform(place).x <= 0:
-        return False
-    solids = slice_at_eye_level(world) if hiding is None else hiding
-    ahead = int(np.argmin(np.abs(BEAM_ANGLES_RAD)))
-    across = Pose(thing.pose.x, thing.pose.y, place.bearing_to(thing.pose.point))
-    for sideways_m in SIDEWAYS_M:
-        part = across.transform(Point(0.0, sideways_m))
-        facing = Pose(place.x, place.y, place.bearing_to(part))
-        free_m = float(measure_ranges(solids.edges, facing)[ahead])
-        if math.isinf(free_m) or free_m >= place.distance_to(part) - OWN_SIZE_M:
-            return True
-    return False
+def _cross(
+    edges: FloatArray, starts: FloatArray, ends: FloatArray, *, stop_before_m: float
+) -> Mask:
+    """Return True for the lines from starts towards ends, shape (n, 2), that cross any edge."""
+    along = ends - starts
+    length_m = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)
+    along = along * np.maximum(1 - stop_before_m / length_m, 0.0)[:, None]
+    sides, gaps = edges[:, 2:] - edges[:, :2], edges[None, :, :2] - starts[:, None]
+    across = along[:, :1] * sides[:, 1] - along[:, 1:] * sides[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        on_line = (gaps[..., 0] * sides[:, 1] - gaps[..., 1] * sides[:, 0]) / across
+        on_edge = (gaps[..., 0] * along[:, 1:] - gaps[..., 1] * along[:, :1]) / across
+    meets = (on_line > 0) & (on_line < 1) & (on_edge >= 0) & (on_edge <= 1)
+    return np.asarray(meets.any(axis=1))

@@ -91,6 +91,7 @@ def test_every_call_and_picture_is_kept_for_replay(tmp_path: Path) -> None:
     turns = read_turns(trial_folder(tmp_path, result.trial))
     assert [turn.role for turn in turns[:2]] == ["system", "user"]
     assert turns[1].text.startswith("Take a picture of")
+    assert result.score.is_success, result.score.reason
     pictures = [name for turn in turns for name in turn.pictures]
     folder = trial_folder(tmp_path, result.trial) / "pictures"
     assert pictures

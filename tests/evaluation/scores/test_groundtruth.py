@@ -3,7 +3,9 @@ import pytest
 
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import TrueRoom, World, WorldWall
+from mapspeak.simulator import TrueRoom, World, WorldObject, WorldWall, load_world
+from mapspeak.spatial import Cell
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import RoomClass
 
 BEHIND = Point(6.0, 0.0)
@@ -67,22 +69,41 @@ def test_robots_begin_in_many_places_with_all_headings() -> None:
     assert len({(pose.x, pose.y) for pose in poses}) > 40
 
 
-def test_a_place_is_seen_from_its_own_room_and_not_through_a_wall() -> None:
-    site = two_rooms(gap_m=0.6)
-    for y in (-1.0, 1.0):
-        seen = site.seen_near(Point(3.0, y), 2.0)
-        rows, cols = np.nonzero(seen)
-        places = site.grid.points_at(rows, cols)
-        assert len(places) > 20
-        assert (np.hypot(places[:, 0] - 3.0, places[:, 1] - y) <= 2.0).all()
-        assert (places[:, 0] < 4.0).all()
+def seen_around(site: GroundTruth, kind: str, pose: Pose, radius_m: float) -> FloatArray:
+    """Gives the places near a thing from which it is in sight, shape (n, 2)."""
+    thing = WorldObject(name="it", kind=kind, pose=pose)
+    rows, cols = np.nonzero(site.seen_around(thing, radius_m))
+    return site.grid.points_at(rows, cols)
+
+
+def test_a_thing_is_seen_from_its_own_room_and_not_through_a_wall() -> None:
+    site = two_rooms(gap_m=0.7)
+    for x in (3.0, 3.7):
+        for y in (-1.6, 1.6):
+            places = seen_around(site, "cabinet", Pose(x, y), 1.2)
+            assert len(places) > 20
+            assert (np.hypot(places[:, 0] - x, places[:, 1] - y) <= 1.2).all()
+            assert (places[:, 0] < 4.0).all()
 
 
 def test_what_hangs_on_a_wall_is_seen_from_before_it_though_the_wall_is_solid() -> None:
-    site = two_rooms(gap_m=0.6)
-    rows, cols = np.nonzero(site.seen_near(Point(3.98, 1.2), 2.0))
-    places = site.grid.points_at(rows, cols)
-    assert (places[:, 0] < 4.0).sum() > 20
+    site = two_rooms(gap_m=0.7)
+    places = seen_around(site, "fire_extinguisher", Pose(3.95, 1.2, np.pi), 2.0)
+    assert len(places) > 20
+    assert (places[:, 0] < 3.95).all()
+
+
+def test_a_task_begins_and_is_judged_by_one_and_the_same_sight() -> None:
+    site = GroundTruth(load_world("office_1"))
+    for thing in site.world.objects[::7]:
+        seen = site.seen_around(thing, 3.0)
+        rows, cols = np.nonzero(site.near(site.place_of(thing), 3.0) & site.drivable)
+        every = [
+            (row, col) for row, col in zip(rows, cols, strict=True) if not (row % 4 or col % 4)
+        ]
+        for row, col in every:
+            place = site.grid.point_at(Cell(int(row), int(col)))
+            assert site.is_in_sight(place, thing) == seen[row, col], thing.name
 
 
 def test_ways_are_as_long_as_the_floor_makes_them() -> None:

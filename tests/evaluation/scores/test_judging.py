@@ -21,7 +21,7 @@ from mapspeak.evaluation.scores.judging import (
     read_word,
     spl,
 )
-from mapspeak.evaluation.trials import Failure, ToolCall, TrialState
+from mapspeak.evaluation.trials import Failure, TrialState
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.coverage import measure_coverage
@@ -97,10 +97,11 @@ def test_a_thing_is_faced_from_near_and_in_sight_of_it_alone(flat: GroundTruth) 
 
 def test_a_picture_counts_that_was_taken_and_shows_the_thing(flat: GroundTruth) -> None:
     things = flat.things("fire_extinguisher")
-    looked = (ToolCall(tool="look_through_camera", arguments={}),)
-    ahead = replace(ended_at(Point(4.0, 0.5)), calls=looked)
+    ahead = replace(ended_at(Point(4.0, 0.5)), pictured_at=Point(4.0, 0.5))
     assert judge_view(flat, ahead, things).is_success
-    aside = replace(ended_at(Point(4.0, 0.5), yaw_rad=math.pi), calls=looked)
+    before = replace(ahead, pictured_at=Point(1.0, 0.5))
+    assert judge_view(flat, before, things).failure is Failure.WRONG_PLACE
+    aside = replace(ended_at(Point(4.0, 0.5), yaw_rad=math.pi), pictured_at=Point(4.0, 0.5))
     assert judge_view(flat, aside, things).failure is Failure.WRONG_OBJECT
     assert judge_view(flat, ended_at(Point(4.0, 0.5)), things).failure is Failure.NO_ANSWER
 

@@ -8,8 +8,8 @@ from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.evaluation.tasks.errands import judge_errand
 from mapspeak.evaluation.tasks.task import Truth
 from mapspeak.evaluation.trials import Failure
-from mapspeak.geometry import Point
-from mapspeak.simulator import StateRecord, load_world, world_names
+from mapspeak.geometry import Point, Pose
+from mapspeak.simulator import StateRecord, WorldObject, load_world, world_names
 from sites import LARGE_ROOM, MEMORY_TEXT, SMALL_ROOM, make_flat
 
 SAID = "speak: All is well."
@@ -51,6 +51,21 @@ def test_what_is_said_counts_in_the_room_it_was_asked_for(flat: GroundTruth) -> 
     assert failure(flat, went((LARGE_ROOM, SAID)), IN_SMALL_ROOM) is Failure.INCOMPLETE
     assert failure(flat, went((SMALL_ROOM, "speak: Hello.")), IN_SMALL_ROOM) is Failure.INCOMPLETE
     assert failure(flat, went(), IN_SMALL_ROOM) is Failure.INCOMPLETE
+
+
+def test_the_nearest_thing_is_that_with_the_shortest_way_to_drive(flat: GroundTruth) -> None:
+    # In the map frame, whose (0, 0) is at (1, 1) of the file's.
+    printers = (
+        WorldObject(name="far", kind="printer", pose=Pose(10.4, 5.4, -1.57)),
+        WorldObject(name="near", kind="printer", pose=Pose(4.4, 2.4, -1.57)),
+    )
+    site = flat.with_more(printers)
+    said: Truth = {"steps": [{"deed": SAID, "kind": "printer"}]}
+    begun = (Point(5.0, 0.5), "open_door: none")
+    beside, other, beyond_a_wall = Point(3.4, 0.5), Point(0.5, 3.5), Point(3.4, 2.6)
+    assert failure(site, went(begun, (beside, SAID)), said) is None
+    assert failure(site, went(begun, (other, SAID)), said) is Failure.INCOMPLETE
+    assert failure(site, went(begun, (beyond_a_wall, SAID)), said) is Failure.INCOMPLETE
 
 
 def test_opened_doors_and_faults_are_no_deeds_of_an_errand(flat: GroundTruth) -> None:

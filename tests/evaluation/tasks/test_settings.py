@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
+from mapspeak.evaluation.scores.judging import Evidence
 from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
-from mapspeak.evaluation.trials import Failure, ToolCall
+from mapspeak.evaluation.trials import Failure, ToolCall, TrialState
 from mapspeak.geometry import Point, Pose
 from mapspeak.server.toolsets import read_text
-from mapspeak.simulator import load_world, world_names
+from mapspeak.simulator import TrueFloor, load_world, world_names
+from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from sites import MEMORY_TEXT, ended_at
 
 SITES: dict[str, GroundTruth] = {}
@@ -154,3 +156,64 @@ def test_a_call_that_makes_no_sense_breaks_no_trial() -> None:
     call = ToolCall(tool="navigate_to", arguments={"x": "the kitchen", "y": [None]})
     score = task.score(site, setting, replace(ended_at(Point(0.0, 0.0)), calls=(call,)))
     assert not score.is_success
+
+
+def test_new_floor_behind_a_wall_does_not_speak_for_a_place_to_explore_next() -> None:
+    site, task = site_of("flat_1"), find_task("question-explore")
+    setting = task.make_setting(site, seed=0, memory=None)
+    largest = max(site.rooms, key=site.floor_area_m2)
+    known = np.where(site.cells_of(largest), site.grid.cells, UNKNOWN).astype(np.int8)
+    grid = replace(site.grid, cells=known)
+    rows, cols = np.nonzero(site.roomy & site.cells_of(largest))
+    walls = TrueFloor(replace(site.world, objects=())).solid
+    for x, y in site.grid.points_at(rows, cols)[::60].tolist():
+        answer = Evidence(states=(), grid=grid, answer=f"ANSWER: {x:.2f}, {y:.2f}")
+        new_m2 = task.score(site, setting, answer).figures["new_m2"]
+        others = site.grid.points_at(*np.nonzero(site.drivable & (known == UNKNOWN)))
+        seen = [is_open(walls, Point(x, y), Point(*other)) for other in others[::20].tolist()]
+        most_m2 = 20 * site.grid.resolution_m**2 * sum(seen)
+        assert new_m2 <= 1.2 * most_m2 + 0.5
+
+
+def is_open(walls: OccupancyGrid, one: Point, other: Point) -> bool:
+    """Gives True where no wall lies between two points."""
+    shares = np.linspace(0.0, 1.0, 400)[:, None]
+    points = np.array([one.x, one.y]) * (1 - shares) + np.array([other.x, other.y]) * shares
+    return not walls.look_up(walls.occupied, points, outside=True).any()
+
+
+def test_who_is_out_of_budget_has_not_done_it_wherever_the_robot_stands() -> None:
+    site, task = site_of("flat_1"), find_task("smallest-room")
+    setting = task.make_setting(site, seed=0, memory=MEMORY_TEXT)
+    there = ended_at(site.middle_of(site.room_named(setting.truth["rooms"][0])))
+    assert task.score(site, setting, there).is_success
+    late = task.score(site, setting, replace(there, state=TrialState.OUT_OF_BUDGET))
+    assert late.failure is Failure.INCOMPLETE
+
+
+@pytest.mark.parametrize(("world", "seed"), [("flat_1", 2), ("flat_2", 7), ("flat_2", 8)])
+def test_a_room_counts_as_unreachable_only_from_where_the_robot_starts(
+    world: str, seed: int
+) -> None:
+    site, task = site_of(world), find_task("blocked-way")
+    setting = task.make_setting(site, seed=seed, memory=MEMORY_TEXT)
+    start = (site.world.start.inverse() @ setting.start).point
+    goal = site.cells_of(site.room_named(setting.truth["room"])) & site.drivable
+    way_m = site.with_more(setting.added).ways_from(start).distances_at(*np.nonzero(goal)).min()
+    assert (setting.truth["shortest_m"] is None) == math.isinf(way_m)
+
+
+def test_a_way_that_is_to_be_blocked_is_blocked() -> None:
+    site, task = site_of("warehouse"), find_task("blocked-way")
+    for seed in range(6):
+        setting = task.make_setting(site, seed=seed, memory=MEMORY_TEXT)
+        start = (site.world.start.inverse() @ setting.start).point
+        goal = site.cells_of(site.room_named(setting.truth["room"]))
+        shortest_m = setting.truth["shortest_m"]
+        assert shortest_m is None or shortest_m >= 1.2 * site.shortest_to_any_m(start, goal)
+
+
+def test_a_search_asks_for_what_counts() -> None:
+    site = site_of("warehouse")
+    setting = find_task("search").make_setting(site, seed=0, memory=None)
+    assert setting.prompt.startswith("Find any ")

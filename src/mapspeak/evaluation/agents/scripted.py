@@ -332,7 +332,7 @@ DEEDS: tuple[tuple[str, Deed], ...] = (
         _go_into_room_around,
     ),
     (
-        r"^Find the nearest (?P<label>.+?) and stop",
+        r"^Find any (?P<label>.+?) and stop",
         lambda driver, match: _go_to_thing(driver, match["label"]),
     ),
     (BESIDE_POSE, _go_beside_pose),

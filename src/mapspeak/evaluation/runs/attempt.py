@@ -24,7 +24,7 @@ from mapspeak.evaluation.agent import (
 from mapspeak.evaluation.agents.catalogue import find_agent
 from mapspeak.evaluation.runs.workplace import CONTROL, TrialSetup, open_workplace
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
-from mapspeak.evaluation.scores.judging import Evidence
+from mapspeak.evaluation.scores.judging import PICTURING, Evidence
 from mapspeak.evaluation.tasks.catalogue import find_task
 from mapspeak.evaluation.trials import (
     MAP,
@@ -44,6 +44,7 @@ from mapspeak.evaluation.trials import (
     turn_line,
     write_result,
 )
+from mapspeak.geometry import Point
 from mapspeak.simulator import StateRecord, World, read_state_log
 from mapspeak.spatial.mapfiles import load_map
 
@@ -66,6 +67,7 @@ class Transcript(Witness):
         self.n_turns = 0
         self.n_errors = 0
         self.calls: list[ToolCall] = []
+        self.pictured_at: Point | None = None
         self._limits = limits
         self._look = look
         self._on_turn = on_turn
@@ -89,6 +91,8 @@ class Transcript(Witness):
                 raise OutOfBudgetError(said, hint="Drive less.")
             self.calls.append(turn.call)
         self.n_errors += turn.is_error
+        if pictures and turn.call is not None and turn.call.tool in PICTURING:
+            self.pictured_at = state.pose.point
         noted = replace(
             turn,
             pictures=tuple(starmap(self._keep, enumerate(pictures))),
@@ -226,6 +230,7 @@ def _gather(folder: Path, transcript: Transcript, end: AgentEnd) -> Evidence:
         answer=end.answer,
         state=end.state,
         calls=tuple(transcript.calls),
+        pictured_at=transcript.pictured_at,
         n_errors=transcript.n_errors,
     )
 

@@ -16,17 +16,16 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import (
     BODY_RADIUS_M,
     KEEP_OFF_M,
+    EyeLevel,
     MeasuredRoom,
     TrueFloor,
     World,
     WorldObject,
-    is_in_sight,
-    slice_at_eye_level,
 )
+from mapspeak.simulator.robot.scanmatch import place_points
 from mapspeak.simulator.worlds.models import find_kind
-from mapspeak.simulator.worlds.slices import Slice
 from mapspeak.spatial import Cell, OccupancyGrid
-from mapspeak.spatial.grid import Mask
+from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 
 BESIDE_M = 5.0
@@ -38,8 +37,8 @@ The paper's goal is the waypoint from which the thing was seen, 3 to 4 m away fr
 START_ROOM_M = 0.4
 """A robot starts, and is sent, where it has this much room around its middle."""
 
-_N_SAMPLES = 50
-_OWN_SIZE_M = 0.6
+LOOK_EVERY_M = 0.2
+"""Spacing of the places from which a thing is looked for."""
 PLAN_RADIUS_M = BODY_RADIUS_M + 0.01
 _NOWHERE, _CUT_OFF, _MAIN = 0, 1, 2
 """Pieces of floor by number; where two grow into the same cell, the higher one has it."""
@@ -62,9 +61,6 @@ class TruePassage:
 
 class GroundTruth:
     """One world's truth."""
-
-    LOOK_EVERY_M = 0.2
-    """Spacing of the places that `seen_near` returns."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -228,12 +224,14 @@ class GroundTruth:
 
     def is_in_sight(self, place: Point, thing: WorldObject) -> bool:
         """Return True when a thing can be seen from a place of the map frame."""
-        there = self.world.start.transform(place)
-        return is_in_sight(self.world, there, thing, hiding=self._hiding)
+        return bool(self._find_sights(thing, np.array([[place.x, place.y]]))[0])
+
+    def _find_sights(self, thing: WorldObject, places: FloatArray) -> Mask:
+        return self._eyes.find_sights(thing, place_points(self.world.start, places))
 
     @cached_property
-    def _hiding(self) -> Slice:
-        return slice_at_eye_level(self.world)
+    def _eyes(self) -> EyeLevel:
+        return EyeLevel(self.world)
 
     def near(self, point: Point, radius_m: float) -> Mask:
         """Return the cells whose middles lie within a distance of a point."""
@@ -251,34 +249,14 @@ class GroundTruth:
         return self._beside[kind]
 
     def seen_around(self, thing: WorldObject, radius_m: float) -> Mask:
-        """Return places near a thing from which it is in sight: in front of it if it hangs."""
-        seen = self.seen_near(self.place_of(thing), radius_m)
-        if not find_kind(thing.kind).is_wall_hung:
-            return seen
-        rows, cols = np.nonzero(seen)
-        front = (self.world.start.inverse() @ thing.pose).inverse()
-        for row, col, (x, y) in zip(rows, cols, self.grid.points_at(rows, cols), strict=True):
-            seen[row, col] = front.transform(Point(float(x), float(y))).x > 0
-        return seen
-
-    def seen_near(self, point: Point, radius_m: float) -> Mask:
-        """Return places near a point from which it can be seen, one every fifth of a metre."""
+        """Return places near a thing from which it is in sight, one every fifth of a metre."""
         grid, found = self.grid, np.zeros(self.grid.cells.shape, dtype=bool)
-        every = max(round(self.LOOK_EVERY_M / grid.resolution_m), 1)
+        every = max(round(LOOK_EVERY_M / grid.resolution_m), 1)
         coarse = np.zeros_like(found)
         coarse[::every, ::every] = True
-        rows, cols = np.nonzero(coarse & self.drivable & self.near(point, radius_m))
-        if not rows.size:
-            return found
-        places = grid.points_at(rows, cols)
-        # The thing itself, and the wall it hangs on, do not hide it.
-        away_m = np.maximum(np.hypot(places[:, 0] - point.x, places[:, 1] - point.y), 1e-9)
-        reach = np.linspace(0.0, 1.0, _N_SAMPLES) * np.clip(1 - _OWN_SIZE_M / away_m, 0, 1)[:, None]
-        xs = places[:, :1] + reach * (point.x - places[:, :1])
-        ys = places[:, 1:] + reach * (point.y - places[:, 1:])
-        is_hidden = grid.look_up(grid.occupied, np.stack([xs, ys], axis=2), outside=False)
-        is_seen = ~is_hidden.any(axis=1)
-        found[rows[is_seen], cols[is_seen]] = True
+        near = self.near(self.place_of(thing), radius_m)
+        rows, cols = np.nonzero(coarse & self.drivable & near)
+        found[rows, cols] = self._find_sights(thing, grid.points_at(rows, cols))
         return found
 
     def floor_area_m2(self, room: MeasuredRoom) -> float:

@@ -33,6 +33,7 @@ class Evidence:
         states: The simulator's true states from begin to end; poses in a map without errors.
         grid: The robot's final map; None without one.
         memory: The final semantic map, as YAML; None without one.
+        pictured_at: Where the robot truly stood when its last picture came; None without one.
     """
 
     states: tuple[StateRecord, ...]
@@ -41,6 +42,7 @@ class Evidence:
     answer: str = ""
     state: TrialState = TrialState.FINISHED
     calls: tuple[ToolCall, ...] = ()
+    pictured_at: Point | None = None
     n_errors: int = 0
 
     @property
@@ -217,6 +219,8 @@ def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -
 
 
 PICTURING = ("look_through_camera", "look_at", "look_around", "explore", "search_for")
+STAYED_M = 0.3
+"""A robot that has moved less than this stays where it is."""
 FACED_M, FACED_RAD = 1.5, math.radians(30.0)
 """A robot faces a thing from within this distance and angle."""
 
@@ -256,8 +260,10 @@ def judge_view(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObje
     The world is drawn anew from there: a thing counts that takes up as much of the picture as the
     detector's smallest.
     """
-    if not any(call.tool in PICTURING for call in evidence.calls):
+    if evidence.pictured_at is None:
         return _judged(evidence, "It took no picture.", {}, Failure.NO_ANSWER)
+    if evidence.pictured_at.distance_to(evidence.end) > STAYED_M:
+        return _judged(evidence, "It went on after its last picture.", {}, Failure.WRONG_PLACE)
     shares = measure_shares_in_view(site.world, site.in_world(evidence.last.pose))
     share = max(shares.get(thing.name, 0.0) for thing in things)
     said = f"{100 * share:.2f} % of the picture are {things[0].kind.replace('_', ' ')}."
@@ -293,19 +299,20 @@ def judge_route(
     """Judge whether the robot came past some things in their order, near each and in sight."""
     n_reached = 0
     for state in evidence.states:
-        if n_reached < len(stops) and _is_at(site, state.pose.point, stops[n_reached]):
+        if n_reached < len(stops) and is_at(site, state.pose.point, stops[n_reached]):
             n_reached += 1
     figures = {"n_stops_reached": float(n_reached), "n_stops": float(len(stops))}
     said = f"It came to {n_reached} of {len(stops)} stops in their order."
     if n_reached < len(stops):
         return _judged(evidence, said, figures, Failure.INCOMPLETE)
-    if not _is_at(site, evidence.end, stops[-1]):
+    if not is_at(site, evidence.end, stops[-1]):
         said = "It went on after the last stop."
         return _judged(evidence, said, figures, Failure.WRONG_PLACE)
     return _judged(evidence, said, figures)
 
 
-def _is_at(site: GroundTruth, point: Point, things: Iterable[WorldObject]) -> bool:
+def is_at(site: GroundTruth, point: Point, things: Iterable[WorldObject]) -> bool:
+    """Return True near one of some things, in sight of it."""
     return any(
         point.distance_to(site.place_of(thing)) <= BESIDE_M and site.is_in_sight(point, thing)
         for thing in things

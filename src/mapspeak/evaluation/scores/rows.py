@@ -44,7 +44,8 @@ class TableRow:
     Attributes:
         agent: The agent's name, with its level of thinking if set.
         n_broken: Number that crashed or hung; they count as trials.
-        figures: Means of all figures of scores and results, by name.
+        figures: Means of all figures of scores and results, by name; a broken trial has none of
+            them, and an SPL of 0.
     """
 
     task: str
@@ -70,6 +71,11 @@ def count_rows(results: Iterable[TrialResult]) -> tuple[TableRow, ...]:
 def _count(task: str, agent: str, representation: str, *, results: list[TrialResult]) -> TableRow:
     whole = [_figures_of(result) for result in results if not result.state.is_broken]
     names = dict.fromkeys(name for figures in whole for name in figures)
+    figures = {name: fmean(each[name] for each in whole if name in each) for name in names}
+    n_broken = len(results) - len(whole)
+    if "spl" in figures:
+        n_weighted = sum("spl" in each for each in whole)
+        figures["spl"] *= n_weighted / (n_weighted + n_broken)
     failures = (result.score.failure for result in results)
     return TableRow(
         task=task,
@@ -77,10 +83,8 @@ def _count(task: str, agent: str, representation: str, *, results: list[TrialRes
         representation=representation,
         n_trials=len(results),
         n_successes=sum(result.score.is_success for result in results),
-        n_broken=len(results) - len(whole),
-        figures={
-            name: fmean(figures[name] for figures in whole if name in figures) for name in names
-        },
+        n_broken=n_broken,
+        figures=figures,
         failures=dict(Counter(failure for failure in failures if failure is not None)),
     )
 

@@ -3,11 +3,16 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from mapspeak.evaluation.scores.groundtruth import BESIDE_M, GroundTruth
-from mapspeak.evaluation.scores.judging import Evidence, verdict
+from mapspeak.evaluation.scores.groundtruth import GroundTruth
+from mapspeak.evaluation.scores.judging import Evidence, is_at, verdict
 from mapspeak.evaluation.tasks.failures import find_doors
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
-from mapspeak.evaluation.tasks.things import SEARCH_TOOLS, findable_kinds
+from mapspeak.evaluation.tasks.things import (
+    CLEARLY_FARTHER,
+    SEARCH_TOOLS,
+    findable_kinds,
+    way_to,
+)
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point
 from mapspeak.server.app import DEFAULT_TOOLSETS
@@ -133,11 +138,12 @@ def _find_deeds(evidence: Evidence) -> Iterator[tuple[str, StateRecord]]:
 def judge_errand(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
     """Judge whether all was done in its order and place, nothing else, and nothing was touched."""
     steps, done = truth["steps"], list(_find_deeds(evidence))
-    n_right = 0
+    n_right, before = 0, evidence.states[0].pose.point if evidence.states else evidence.end
     for step, (deed, state) in zip(steps, done, strict=False):
-        if not deed.startswith(step["deed"]) or not _is_place(site, step, state.pose.point):
+        here = state.pose.point
+        if not deed.startswith(step["deed"]) or not _is_place(site, step, here, before):
             break
-        n_right += 1
+        n_right, before = n_right + 1, here
     charged = [step["battery_ratio"] for step in steps if "battery_ratio" in step]
     at_last = done[-1][1].battery_ratio if done else 0.0
     figures = {
@@ -160,14 +166,17 @@ def judge_errand(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
     return verdict(said, figures, failure=failure)
 
 
-def _is_place(site: GroundTruth, step: Step, here: Point) -> bool:
+def _is_place(site: GroundTruth, step: Step, here: Point, before: Point) -> bool:
+    """Return True in the room, or beside the nearest thing by the way from where it was before."""
     if "room" in step:
         room = site.room_at(here)
         return room is not None and room.room.name == step["room"]
-    return "kind" not in step or any(
-        here.distance_to(site.place_of(thing)) <= BESIDE_M and site.is_in_sight(here, thing)
-        for thing in site.things(step["kind"])
-    )
+    if "kind" not in step:
+        return True
+    ways, things = site.ways_from(before), site.things(step["kind"])
+    ways_m = {thing.name: way_to(site, ways, thing) for thing in things}
+    most_m = CLEARLY_FARTHER * min(ways_m.values())
+    return is_at(site, here, [thing for thing in things if ways_m[thing.name] <= most_m])
 
 
 def _has_things(site: GroundTruth) -> bool:

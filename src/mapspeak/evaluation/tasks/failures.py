@@ -34,6 +34,7 @@ from mapspeak.simulator import MeasuredRoom, WorldDoor, WorldObject
 
 THERE, UNREACHABLE = "there", "unreachable"
 LEAST_DETOUR = 1.2
+STARTS_PER_DOOR = 8
 LIMITS = Limits(n_calls=80, robot_time_s=1200.0, wall_s=900.0)
 CRATE_M = 0.8
 """Width of a crate."""
@@ -46,14 +47,16 @@ ROOM_LEFT_RATIO = 0.5
 def _draw_blocked_way(draw: Draw) -> Setting:
     """Draw a door that the map shows and crates block: there is another way, or none."""
     site = draw.site
-    for door, (room, _) in draw.shuffled(find_doors(site)):
+    for door, (room, _) in draw.shuffled(find_doors(site)) * STARTS_PER_DOOR:
         crates = _close_door(door)
         blocked = site.with_more(crates)
         goal = site.cells_of(room)
         near = [site.near(site.place_of(crate), 2 * CRATE_M) for crate in crates]
         start = draw.start(without=goal | np.logical_or.reduce(near))
         way_m = site.shortest_to_any_m(start.point, goal)
-        left_m = blocked.shortest_to_any_m(start.point, goal)
+        ways = blocked.ways_from(start.point)
+        # What lies behind the crates may be just where the robot starts.
+        left_m = float(ways.distances_at(*np.nonzero(goal & site.drivable)).min(initial=math.inf))
         is_standable = blocked.grid.is_free(blocked.grid.cell_at(start.point))
         if left_m >= LEAST_DETOUR * way_m and is_standable:
             break

@@ -18,7 +18,6 @@ from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth, pair, 
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import MeasuredRoom
-from mapspeak.simulator.robot.lidar import MAX_RANGE_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass
 
@@ -189,9 +188,9 @@ def _views(site: GroundTruth, grid: OccupancyGrid) -> list[Point]:
 
 def _new_floor_m2(site: GroundTruth, grid: OccupancyGrid, view: Point) -> float:
     """Return how much floor comes into view from a place that the map does not know."""
-    seen = site.seen_near(view, MAX_RANGE_M)
+    seen = site.floor.see_from([view]) & site.drivable
     n_new = int(seen.sum()) - count_known(grid, site.grid, seen)
-    return float(n_new) * site.LOOK_EVERY_M**2
+    return float(n_new) * site.grid.resolution_m**2
 
 
 QUESTION_TASKS = (

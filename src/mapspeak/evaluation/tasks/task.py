@@ -2,14 +2,14 @@
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from mapspeak.evaluation.scores.groundtruth import GroundTruth
 from mapspeak.evaluation.scores.judging import Evidence
-from mapspeak.evaluation.trials import Limits, Score, Setting
+from mapspeak.evaluation.trials import Failure, Limits, Score, Setting, TrialState
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import WorldObject
 from mapspeak.spatial.grid import Mask
@@ -98,8 +98,15 @@ class Task:
         return self.draw(Draw(site, np.random.default_rng([seed, *names]), seed, memory))
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score a trial by the truth of the world as it was set: with what was added to it."""
-        return self.judge(site, setting.truth, evidence)
+        """Score a trial by the truth of the world as it was set: with what was added to it.
+
+        A trial that is out of budget is no success, wherever its robot stands.
+        """
+        score = self.judge(site, setting.truth, evidence)
+        if score.is_success and evidence.state is TrialState.OUT_OF_BUDGET:
+            reason = f"It was out of budget. {score.reason}"
+            return replace(score, is_success=False, failure=Failure.INCOMPLETE, reason=reason)
+        return score
 
 
 def point_text(point: Point) -> str:

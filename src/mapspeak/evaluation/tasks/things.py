@@ -88,7 +88,7 @@ def judge_kind(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
 def _draw_search(draw: Draw) -> Setting:
     """Name a thing in a building that the robot has never seen, without map and memory."""
     kind = str(draw.random.choice(findable_kinds(draw.site)))
-    prompt = f"Find the nearest {draw.site.label_of(kind)} and stop beside it."
+    prompt = f"Find any {draw.site.label_of(kind)} and stop beside it."
     tools = (*SEARCH_TOOLS, "explore")
     return thing_setting(draw, prompt, kind, is_known=False, tools=tools, limits=SEARCH_LIMITS)
 
@@ -112,7 +112,7 @@ def _draw_by_way(draw: Draw) -> Setting:
         kind, order = draw.one_of(_several_kinds(site)), draw.one_of((NEAREST, FARTHEST))
         things, start = site.things(kind), draw.start()
         ways = site.ways_from(start.point)
-        ways_m = [_way_to(site, ways, thing) for thing in things]
+        ways_m = [way_to(site, ways, thing) for thing in things]
         ordered = sorted(range(len(things)), key=lambda at: ways_m[at], reverse=order == FARTHEST)
         near_m, far_m = sorted(ways_m[at] for at in ordered[:2])
         if near_m > OUT_OF_THE_WAY_M and CLEARLY_FARTHER * near_m <= far_m < math.inf:
@@ -124,7 +124,7 @@ def _draw_by_way(draw: Draw) -> Setting:
     return draw.setting(prompt, start, truth)
 
 
-def _way_to(site: GroundTruth, ways: DistanceField, thing: WorldObject) -> float:
+def way_to(site: GroundTruth, ways: DistanceField, thing: WorldObject) -> float:
     """Return the way to the nearest place from which a thing is seen from near."""
     rows, cols = np.nonzero(site.seen_around(thing, NEAR_M))
     return float(ways.distances_at(rows, cols).min(initial=math.inf))
