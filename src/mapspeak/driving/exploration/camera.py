@@ -42,8 +42,8 @@ from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
-DRIVE_WORTH_M = 0.7
-"""So much new wall all around a place is worth a drive there."""
+LEAST_WALL_M, WALL_PER_M = 0.4, 0.05
+"""New wall all around a place that is worth a drive there: at least, and for a metre of way."""
 MOST_ORDERED = 9
 """What is farther off does not come first, and all orders of these are looked at."""
 SAME_SPOT_M = 0.15
@@ -109,16 +109,17 @@ def _cover_walls(
     world: WorldModel, shown: Mask, half_rad: float, can_be: Callable[[Target], bool]
 ) -> Iterator[Target]:
     """Return stops that show all the wall worth a drive: greedily, who shows most first."""
-    points, _ = spread_places(world)
+    points, ways_m = spread_places(world)
     walls = find_walls_by_heading(world.grid, points)
-    is_left = np.ones(len(points), dtype=np.bool_)
+    least_m = LEAST_WALL_M + WALL_PER_M * ways_m
     while True:
         new_m = walls.measure_new(shown)
-        total_m = np.where(is_left, new_m.sum(axis=1), 0.0)
-        index = int(total_m.argmax()) if len(points) else 0
-        if not len(points) or total_m[index] < DRIVE_WORTH_M:
+        total_m = new_m.sum(axis=1)
+        total_m[total_m < least_m] = 0.0
+        if not total_m.any():
             return
-        is_left[index] = False
+        index = int(total_m.argmax())
+        least_m[index] = math.inf
         target = _target(Point(*points[index].tolist()), new_m[index], half_rad)
         if can_be(target):
             yield target
