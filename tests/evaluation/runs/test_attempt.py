@@ -58,6 +58,17 @@ def test_the_smallest_room_is_found_on_a_known_map(tmp_path: Path, agent: str) -
     assert result.shortest_m is not None
 
 
+@pytest.mark.parametrize(
+    ("task", "seed"), [("superlative", 2), ("view", 1), ("errand-patrol", 1), ("blocked-way", 1)]
+)
+def test_who_knows_the_truth_does_what_is_asked(tmp_path: Path, task: str, seed: int) -> None:
+    world = load_world("flat_1")
+    preparation = prepare(tmp_path, world)
+    trial = replace(preparation, task=task, seed=seed, agent="oracle")
+    result = attempt(tmp_path, trial, world, preparation)
+    assert result.score.is_success, result.score.reason
+
+
 def test_a_trial_can_be_watched_in_a_live_page(tmp_path: Path) -> None:
     world, address, seen = make_flat(tmp_path), find_free_address(), list[int]()
     preparation = prepare(tmp_path, world)

@@ -26,15 +26,19 @@ MOST_STANDS = 6
 async def answer_by_truth(
     setting: Setting, site: GroundTruth, task: Assignment, tools: ToolClient
 ) -> AgentEnd:
-    """Drive to where truth says, and answer what truth says; explore as the script does."""
+    """Drive to where truth says, look, and answer what truth says.
+
+    It explores and does errands as the script does.
+    """
     truth, driver = setting.truth, ToolDriver(tools)
     if "said" in truth:
         return AgentEnd(answer=f"ANSWER: {truth['said']}")
-    if not setting.is_known or not truth:
+    if not setting.is_known or not truth or "steps" in truth:
         return await follow_script(task, tools)
     for goals in _stops(truth, site):
         if not await _drive_to_one(driver, goals):
             return AgentEnd(answer="The robot cannot get there.")
+    await tools.call("look_through_camera")
     return AgentEnd(answer="ANSWER: there")
 
 
@@ -47,13 +51,16 @@ def _stops(truth: Mapping[str, Any], site: GroundTruth) -> list[list[Pose]]:
         names = truth.get("rooms") or [truth["room"]]
         cells = [site.cells_of(site.room_named(name)) for name in names]
         return [_roomiest(site, np.logical_or.reduce(cells))]
-    return [_beside(site, kind) for kind in truth.get("kinds") or [truth["kind"]]]
+    kinds = truth.get("kinds") or [truth["kind"]]
+    return [_beside(site, kind, name=truth.get("name")) for kind in kinds]
 
 
-def _beside(site: GroundTruth, kind: str) -> list[Pose]:
+def _beside(site: GroundTruth, kind: str, *, name: str | None) -> list[Pose]:
+    """Return poses before things of a kind, or before the one of a name."""
     return [
         Pose(pose.x, pose.y, pose.point.bearing_to(site.place_of(thing)))
         for thing in site.things(kind)
+        if name in (None, thing.name)
         for pose in _roomiest(site, site.seen_around(thing, BESIDE_M))
     ]
 
