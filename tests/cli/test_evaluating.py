@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -139,3 +141,17 @@ def test_a_report_that_cannot_be_put_in_its_place_leaves_no_half_of_it(tmp_path:
     with pytest.raises(IsADirectoryError):
         run("--report", "--out", str(tmp_path))
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".report")] == []
+
+
+def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path: Path) -> None:
+    asked = ["eval", "--task", "explore", "--worlds", "flat_1", "--out", str(tmp_path / "out")]
+    with subprocess.Popen(  # noqa: S603 - our own program
+        [sys.executable, "-m", "mapspeak", *asked], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith("1 trials in 1 world by scripted")
+        process.terminate()
+        said = process.stderr.read()
+    assert process.returncode == 130
+    assert said.startswith("Stopped: 0 of ")
+    assert not list((tmp_path / "out").glob("**/result.json"))

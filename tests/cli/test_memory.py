@@ -269,6 +269,7 @@ def test_a_merge_that_fails_leaves_nothing_behind(
         (["merge", "PLACES", "PLACES", "--out", "PLACES"], "there already"),
         (["episodes", "--since", "soon", "--semantic-map", "PLACES"], "09:30"),
         (["episodes", "--near", "here", "--semantic-map", "PLACES"], "x,y,radius"),
+        (["episodes", "--near", "nan,1", "--semantic-map", "PLACES"], "x,y,radius"),
     ],
 )
 def test_what_cannot_be_done_is_said(

@@ -1,4 +1,5 @@
 import math
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from mapspeak.simulator import (
     World,
     load_world,
 )
+from mapspeak.simulator.camera.camera import PinholeCamera
 from mapspeak.spatial.rooms import RoomClass
 
 
@@ -210,3 +212,22 @@ def test_the_path_that_is_driven_is_told_until_the_drive_ends(warehouse: World) 
     assert end.distance_to(goal.point) < 0.1
     simulation.stop()
     assert not simulation.planned_path
+
+
+class BusySimulation(Simulation):
+    """One that goes on for two seconds while its camera is prepared."""
+
+    @cached_property
+    def _camera(self) -> PinholeCamera:
+        step_for(self, 2.0)
+        return PinholeCamera(self._world)
+
+
+def test_a_picture_shows_what_was_ahead_when_it_was_asked_for(warehouse: World) -> None:
+    simulation = BusySimulation(warehouse, seed=0)
+    simulation.start_goal(Pose(2.0, 0.0))
+    step_for(simulation, 1.0)
+    asked_at = simulation.truth.pose_in_world
+    picture = simulation.take_picture()
+    assert simulation.truth.pose_in_world.point.distance_to(asked_at.point) > 0.5
+    assert (picture == PinholeCamera(warehouse).render(asked_at)).all()

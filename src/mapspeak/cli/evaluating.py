@@ -1,6 +1,9 @@
 """`mapspeak eval`: tasks, agents and worlds, trial by trial, scored from the simulator's truth."""
 
+import signal
 import sys
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +21,16 @@ TABLE_WIDTH = 180
 """Width of the table in characters where the terminal's is unknown, as in a file."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells have it."""
+
+
+@contextmanager
+def interrupted_by_sigterm() -> Generator[None]:
+    """Let SIGTERM end what goes on as Ctrl-C does, with nothing left running or out of order."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
@@ -127,7 +140,7 @@ def evaluate(*, folder: Path, is_quiet: bool, is_report_only: bool, **chosen: An
 
     Started again with the same folder, it goes on where it was left off. The exit status is 0 when
     every trial came to a result, whatever the result is; 1 when one crashed or hung; 2 when
-    something that was asked for does not exist; 130 after Ctrl-C.
+    something that was asked for does not exist; 130 after Ctrl-C or SIGTERM.
     """
     from mapspeak.evaluation.agents.catalogue import check_agent  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.evaluation.runs.plan import RunOptions  # noqa: PLC0415
@@ -165,7 +178,7 @@ def _write_report(
     from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
 
-    log = write_log(folder, results, versions, is_whole=True)
+    log = write_log(folder, results, versions)
     click.echo(f"The trials can be replayed in {write_page(folder, results)}; the log is {log}.")
 
 
@@ -190,7 +203,8 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
             bar.note(result)
 
         try:
-            plan = run_evaluation(options, on_plan=on_plan, on_done=on_done)
+            with interrupted_by_sigterm():
+                plan = run_evaluation(options, on_plan=on_plan, on_done=on_done)
         except KeyboardInterrupt:
             bar.progress.stop()
             click.echo(f"Stopped: {bar.n_done} of {bar.n_asked} are done.", err=True)

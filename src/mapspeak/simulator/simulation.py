@@ -133,14 +133,14 @@ class Simulation:
 
     def take_picture(self, camera: str = FRONT) -> NDArray[np.uint8]:
         """Take a picture with one of `CAMERAS`: 0 to 255, shape (height, width, 3)."""
-        return self._camera.render(self._body.world_from_base @ CAMERAS[camera])
+        # Preparing the camera takes its time, in which a robot on the real clock drives on.
+        world_from_base = self._body.world_from_base
+        return self._camera.render(world_from_base @ CAMERAS[camera])
 
     def detect(self) -> tuple[Detection, ...]:
         """Return what the simulated detector reports of the camera's view, from left to right."""
-        width_px, height_px = _DETECTOR_SIZE_PX
-        view = self._camera.observe(
-            self._body.world_from_base, width_px=width_px, height_px=height_px
-        )
+        world_from_base, (width_px, height_px) = self._body.world_from_base, _DETECTOR_SIZE_PX
+        view = self._camera.observe(world_from_base, width_px=width_px, height_px=height_px)
         return self._detector.detect(view)
 
     # --- driving ---

@@ -23,7 +23,7 @@ def log(tmp_path: Path) -> Path:
         make_trial(3), failure=Failure.BROKEN, state=TrialState.CRASHED, error="a bug"
     )
     write_result(tmp_path, crashed)
-    return write_log(tmp_path, read_results(tmp_path), {"mapspeak": "1.2.3"}, is_whole=True)
+    return write_log(tmp_path, read_results(tmp_path), {"mapspeak": "1.2.3"})
 
 
 def test_trials_of_a_kind_are_epochs_of_one_sample(log: Path) -> None:

@@ -46,10 +46,11 @@ def test_thinking_without_anyone_who_thinks_is_refused(tmp_path: Path) -> None:
         RunOptions(folder=tmp_path, agents=("scripted", "oracle"), thinking=("low",))
 
 
-def test_two_trials_that_would_lie_in_one_folder_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("other", ["maps_a.yaml", "maps/A.yaml"])
+def test_two_trials_that_would_lie_in_one_folder_are_refused(tmp_path: Path, other: str) -> None:
     world = make_flat(tmp_path)
-    options = RunOptions(worlds=("maps/a.yaml", "maps_a.yaml"), folder=tmp_path)
-    with pytest.raises(ConfigError, match=r"maps/a\.yaml and maps_a\.yaml"):
+    options = RunOptions(worlds=("maps/a.yaml", other), folder=tmp_path)
+    with pytest.raises(ConfigError, match=rf"maps/a\.yaml and {other}"):
         plan_run(options, dict.fromkeys(options.worlds, world))
 
 

@@ -212,6 +212,19 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
         run_evaluation(options, on_plan=lambda _: None, on_done=trialworks.ignore)
 
 
+def test_what_a_system_leaves_in_a_folder_by_itself_does_not_make_it_something_else(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / ".DS_Store").touch()
+    options = RunOptions(worlds=("flat_1",), folder=tmp_path)
+    with pytest.raises(InterruptedError, match="as far as the plan"):
+        run_evaluation(options, on_plan=_interrupt, on_done=trialworks.ignore)
+
+
+def _interrupt(_plan: object) -> None:
+    raise InterruptedError("as far as the plan")
+
+
 def test_a_place_that_cannot_be_written_to_is_told_without_a_trace(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="No space left"), writing_to(tmp_path):
         raise OSError(errno.ENOSPC, "No space left on device")

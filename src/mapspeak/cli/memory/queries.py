@@ -1,6 +1,7 @@
 """`mapspeak memory episodes`, `find`, `check`: what was seen, what words mean, what can be true."""
 
 import json
+import math
 import re
 import sys
 from datetime import datetime, timedelta
@@ -59,7 +60,7 @@ def read_place(text: str) -> tuple[float, ...]:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
         numbers = ()
-    if len(numbers) not in (2, 3):
+    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
         said = f"{text!r} is no place: write x,y or x,y,radius in metres, as 4.2,-1,3."
         raise click.BadParameter(said)
     return numbers

@@ -21,14 +21,11 @@ RIGHT, WRONG = "C", "I"
 """Scores of inspect-ai for right and wrong."""
 
 
-def write_log(
-    run: Path, results: Sequence[TrialResult], versions: Mapping[str, str], *, is_whole: bool
-) -> Path:
+def write_log(run: Path, results: Sequence[TrialResult], versions: Mapping[str, str]) -> Path:
     """Write the log of a run into its folder.
 
     Args:
         versions: Of everything that took part, by name.
-        is_whole: All that was asked for has a result.
     """
     new, summaries = run / f".{LOG}", []
     with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as log:
@@ -38,14 +35,12 @@ def write_log(
             log.writestr(name, json.dumps(sample))
             summaries.append(_summary(sample))
         log.writestr("summaries.json", json.dumps(summaries))
-        header = _header(results, versions, is_whole=is_whole)
+        header = _header(results, versions)
         log.writestr("header.json", json.dumps(header))
     return new.replace(run / LOG)
 
 
-def _header(
-    results: Sequence[TrialResult], versions: Mapping[str, str], *, is_whole: bool
-) -> dict[str, Any]:
+def _header(results: Sequence[TrialResult], versions: Mapping[str, str]) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     ids = list(dict.fromkeys(_sample_id(result.trial) for result in results))
     tasks = ", ".join(dict.fromkeys(result.trial.task for result in results))
@@ -54,7 +49,7 @@ def _header(
     metric = {"name": "accuracy", "value": accuracy, "params": {}}
     return {
         "version": 2,
-        "status": "success" if is_whole else "cancelled",
+        "status": "success",
         "eval": {
             "eval_id": _id_of(f"eval {now}"),
             "run_id": _id_of(f"run {now}"),

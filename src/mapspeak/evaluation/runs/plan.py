@@ -169,7 +169,7 @@ def _check_ids(trials: Iterable[Trial]) -> None:
     """Check that no two trials would write over each other."""
     known: dict[str, Trial] = {}
     for trial in trials:
-        other = known.setdefault(trial.id, trial)
+        other = known.setdefault(trial.id.casefold(), trial)
         if other != trial:
             pairs = ((other.world, trial.world), (other.agent, trial.agent))
             named = next((pair for pair in pairs if pair[0] != pair[1]), (other.id, trial.id))

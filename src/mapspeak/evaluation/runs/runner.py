@@ -125,7 +125,7 @@ def run_evaluation(
     folder = options.folder
     with writing_to(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        there = {path.name for path in folder.iterdir()} - {LOCK}
+        there = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
         if there and "trials" not in there:
             raise ConfigError(
                 f"{folder} holds other things, such as {min(there)}, and no evaluation.",
