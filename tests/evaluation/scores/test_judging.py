@@ -230,3 +230,21 @@ def test_a_choice_is_all_or_nothing() -> None:
     said = ended_at(HALL, answer="ANSWER: A, B")
     assert judge_choice(said, ["B", "A"]).is_success
     assert judge_choice(said, ["A"]).figures["n_wrong"] == 1
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "ANSWER: {}",
+        "**ANSWER:** {}",
+        "ANSWER: **{}**",
+        "**ANSWER: {}**",
+        "`ANSWER: {}`",
+        "*Answer*: {}.",
+    ],
+)
+def test_an_answer_may_be_printed_in_bold(answer: str) -> None:
+    assert read_number(answer.format("-2.5 m"), "m") == -2.5
+    assert read_letters(answer.format("A, C")) == {"A", "C"}
+    assert read_point(answer.format("-1.5, -2")) == Point(-1.5, -2.0)
+    assert read_word(answer.format("unreachable"), ("there", "unreachable")) == "unreachable"

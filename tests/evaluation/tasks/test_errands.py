@@ -49,7 +49,9 @@ def failure(flat: GroundTruth, evidence: Evidence, truth: Truth) -> Failure | No
 def test_what_is_said_counts_in_the_room_it_was_asked_for(flat: GroundTruth) -> None:
     assert failure(flat, went((SMALL_ROOM, SAID)), IN_SMALL_ROOM) is None
     assert failure(flat, went((LARGE_ROOM, SAID)), IN_SMALL_ROOM) is Failure.INCOMPLETE
-    assert failure(flat, went((SMALL_ROOM, "speak: Hello.")), IN_SMALL_ROOM) is Failure.INCOMPLETE
+    for words in ("Hello.", "All is well. Or nearly so."):
+        said = went((SMALL_ROOM, f"speak: {words}"))
+        assert failure(flat, said, IN_SMALL_ROOM) is Failure.INCOMPLETE
     assert failure(flat, went(), IN_SMALL_ROOM) is Failure.INCOMPLETE
 
 

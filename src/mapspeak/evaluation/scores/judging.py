@@ -58,7 +58,8 @@ class Evidence:
 
 # --- answers -------------------------------------------------------------------------------------
 
-LINE = re.compile(r"^\W*ANSWER\s*:\s*(?P<said>.*?)\W*$", re.IGNORECASE | re.MULTILINE)
+LINE = re.compile(r"^\W*ANSWER[\s*_`]*:[\s*_`]*(?P<said>.*?)\W*$", re.IGNORECASE | re.MULTILINE)
+"""Models print it in bold, in part or as a whole."""
 NUMBER = r"[-+]?\d+(?:\.\d+)?"
 UNITS = {"m2": r"(?:m2|m²|m\^2|sq\.? ?m|square met(?:re|er)s)", "m": r"(?:m|met(?:re|er)s)", "": ""}
 

@@ -141,7 +141,7 @@ def judge_errand(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
     n_right, before = 0, evidence.states[0].pose.point if evidence.states else evidence.end
     for step, (deed, state) in zip(steps, done, strict=False):
         here = state.pose.point
-        if not deed.startswith(step["deed"]) or not _is_place(site, step, here, before):
+        if not _is_deed(step, deed) or not _is_place(site, step, here, before):
             break
         n_right, before = n_right + 1, here
     charged = [step["battery_ratio"] for step in steps if "battery_ratio" in step]
@@ -164,6 +164,12 @@ def judge_errand(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
         return verdict(said, figures, failure=Failure.INCOMPLETE)
     failure = Failure.COLLIDED if evidence.last.n_collisions else None
     return verdict(said, figures, failure=failure)
+
+
+def _is_deed(step: Step, deed: str) -> bool:
+    """Return True for what is asked for, word for word; which dock it is does not matter."""
+    wanted = str(step["deed"])
+    return deed == wanted or (wanted.endswith(": ") and deed.startswith(wanted))
 
 
 def _is_place(site: GroundTruth, step: Step, here: Point, before: Point) -> bool:
