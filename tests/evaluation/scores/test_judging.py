@@ -245,6 +245,6 @@ def test_a_choice_is_all_or_nothing() -> None:
 )
 def test_an_answer_may_be_printed_in_bold(answer: str) -> None:
     assert read_number(answer.format("-2.5 m"), "m") == -2.5
-    assert read_letters(answer.format("A, C")) == {"A", "C"}
+    assert read_letters(answer.format("A, C")) == frozenset({"A", "C"})
     assert read_point(answer.format("-1.5, -2")) == Point(-1.5, -2.0)
     assert read_word(answer.format("unreachable"), ("there", "unreachable")) == "unreachable"
