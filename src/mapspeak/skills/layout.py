@@ -213,10 +213,7 @@ class _Builder:
         longest = field.length or field.most or MOST_LISTED
         if field.type == "uint8" and longest > MOST_IN_LIST:
             return SkillParameter(
-                name=field.name,
-                kind=ParameterKind.BYTES,
-                description=remark,
-                most=MOST_TEXT,
+                name=field.name, kind=ParameterKind.BYTES, description=remark, most=MOST_TEXT
             )
         return SkillParameter(
             name=field.name,

@@ -22,13 +22,7 @@ from mapspeak.skill import Arguments, JsonValue, OnProgress, Skill, SkillOutcome
 from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.missiontree import (
-    Mission,
-    MissionBounds,
-    MissionChecker,
-    MissionCourse,
-    Step,
-)
+from mapspeak.skills.missiontree import Mission, MissionBounds, MissionChecker, MissionCourse, Step
 
 MOST_TOLD = 160
 """Letters of the steps that a person is asked about; the tree has them all."""

@@ -24,13 +24,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.conditions import Facts
 from mapspeak.skills.guarding import wait
-from mapspeak.skills.missiontree import (
-    FindSkill,
-    MissionCourse,
-    Step,
-    StepKind,
-    fill_in,
-)
+from mapspeak.skills.missiontree import FindSkill, MissionCourse, Step, StepKind, fill_in
 
 MOST_TOLD = 40
 """Steps of the account that are told; the record on disk has all."""

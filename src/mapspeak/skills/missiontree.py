@@ -7,14 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from mapspeak.errors import SkillError
-from mapspeak.skill import (
-    Arguments,
-    JsonValue,
-    Skill,
-    SkillEffect,
-    SkillSpec,
-    SkillState,
-)
+from mapspeak.skill import Arguments, JsonValue, Skill, SkillEffect, SkillSpec, SkillState
 from mapspeak.skills.arguments import check_arguments, plain
 
 MOST_DRIVES = 1000

@@ -146,9 +146,7 @@ class SkillRuns:
     """
 
     def __init__(
-        self,
-        count_stops: Callable[[], int] = lambda: 0,
-        questions: QuestionBook | None = None,
+        self, count_stops: Callable[[], int] = lambda: 0, questions: QuestionBook | None = None
     ) -> None:
         self.questions = questions or QuestionBook()
         self._count_stops = count_stops
@@ -181,12 +179,7 @@ class SkillRuns:
                     run.give_up(SkillCode.STOPPED)
 
     async def begin(
-        self,
-        skill: Skill,
-        arguments: Arguments,
-        *,
-        wait_s: float,
-        on_news: OnNews | None = None,
+        self, skill: Skill, arguments: Arguments, *, wait_s: float, on_news: OnNews | None = None
     ) -> SkillRun:
         """Run a skill, and return when it has ended, or when the time is over while it goes on.
 

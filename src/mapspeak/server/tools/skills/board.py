@@ -122,10 +122,7 @@ class SkillBoard:
                 given = shorten_wait(own.pop(WAIT.name, WAIT.default))
                 wait_s = check_value(WAIT, given, where=WAIT.name, what=name)
             run = await self.runs.begin(
-                skill,
-                own,
-                wait_s=wait_s,
-                on_news=None if context is None else tell_news(context),
+                skill, own, wait_s=wait_s, on_news=None if context is None else tell_news(context)
             )
         except MapspeakError as error:
             raise ToolError(say_error(error)) from error

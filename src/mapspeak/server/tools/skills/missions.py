@@ -34,10 +34,7 @@ from mapspeak.skills.skillsfile import (
 from mapspeak.skills.treereading import parse_tree
 
 MOST_ARGUMENTS = 20
-Tree = Annotated[
-    Any,
-    WithJsonSchema({"type": "string", "description": "YAML or JSON"}),
-]
+Tree = Annotated[Any, WithJsonSchema({"type": "string", "description": "YAML or JSON"})]
 """A text for its writers; the server has read one that is JSON by the time it comes here."""
 Name = Annotated[str, Field(description="small letters, digits, _", pattern=NAME)]
 SavedName = Annotated[str | None, Field(description="of a saved mission", max_length=60)]
@@ -60,8 +57,7 @@ Wait = Annotated[
 ]
 Sentence = Annotated[str, Field(description="what it does", max_length=300)]
 Correction = Annotated[
-    str | None,
-    Field(description="what a person wants of it, such as: knock first", max_length=300),
+    str | None, Field(description="what a person wants of it, such as: knock first", max_length=300)
 ]
 QuestionId = Annotated[str | None, Field(description="such as Q1; else the oldest", max_length=20)]
 Answer = Annotated[str | None, Field(description="left out, it shows the question", max_length=300)]
