@@ -33,7 +33,6 @@ from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.server.app import build_server
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
-from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.skill import (
@@ -45,6 +44,7 @@ from mapspeak.skill import (
     SkillSpec,
     succeeded,
 )
+from mapspeak.skills.arguments import schema_of
 from mapspeak.skills.layout import build_layout
 
 __all__ = ["measure"]

@@ -14,9 +14,8 @@ from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.interfaces import Interfaces
-from mapspeak.server.tools.skills.schema import schema_of
 from mapspeak.skill import ParameterKind
-from mapspeak.skills.arguments import check_arguments
+from mapspeak.skills.arguments import check_arguments, schema_of
 from mapspeak.skills.layout import build_layout
 from messaging import messages_of
 

@@ -3,7 +3,7 @@
 import pytest
 
 from mapspeak.errors import SkillError
-from mapspeak.skills.questions import QuestionBook
+from mapspeak.skills.runs import QuestionBook
 
 
 def test_only_the_client_that_runs_a_mission_answers_its_questions_while_it_is_there() -> None:

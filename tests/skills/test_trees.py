@@ -13,15 +13,8 @@ from mapspeak.skill import (
     SkillEffect,
     SkillParameter,
 )
-from mapspeak.skills.missiontree import (
-    Mission,
-    MissionBounds,
-    MissionChecker,
-    Step,
-    StepKind,
-    fill_in,
-)
-from mapspeak.skills.treereading import parse_tree, read_tree
+from mapspeak.skills.mission import Mission, MissionBounds, MissionChecker
+from mapspeak.skills.steps import Step, StepKind, fill_in, parse_tree, read_tree
 from skillmaking import FakeSkill, spec
 
 

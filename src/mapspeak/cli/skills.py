@@ -145,8 +145,8 @@ async def _try(
     robot: str,
     guard: GuardChoice,
 ) -> None:
+    from mapspeak.server.tools.skills.board import say_run  # noqa: PLC0415
     from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
-    from mapspeak.server.tools.skills.running import say_run  # noqa: PLC0415
     from mapspeak.skill import SkillState  # noqa: PLC0415
 
     async with _open(entries, robot, guard) as (book, runs):

@@ -30,9 +30,9 @@ from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
 from mapspeak.server.tools.routes import RouteTools
+from mapspeak.server.tools.skills.board import SkillRunTools
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.missions import MissionTools
-from mapspeak.server.tools.skills.running import SkillRunTools
 from mapspeak.server.tools.toolset import Tool, ToolEffect, tools_of
 from mapspeak.session import Session
 from mapspeak.skills.runs import SkillRuns

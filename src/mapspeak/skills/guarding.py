@@ -1,27 +1,172 @@
-"""A skill as every caller runs it: checked, allowed by the guard, noted, and ended in time."""
+"""A skill as every caller runs it: under its conditions, allowed by the guard, ended in time."""
 
-from collections.abc import Awaitable, Callable
+import math
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
+from datetime import datetime
 from functools import partial
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import anyio
 
-from mapspeak.errors import MapspeakError
+from mapspeak.errors import MapspeakError, SkillError
 from mapspeak.safety import Guard, RunSkill, covered_by
 from mapspeak.skill import (
     Arguments,
+    JsonValue,
     OnProgress,
+    ParameterKind,
     Skill,
     SkillCode,
     SkillEffect,
     SkillOutcome,
+    SkillParameter,
     SkillSpec,
     SkillState,
 )
-from mapspeak.skills.arguments import check_arguments
-from mapspeak.skills.conditions import Facts, find_unmet
+from mapspeak.skills.arguments import check_arguments, plain
+
+TEXT, NUMBER, FLAG = ParameterKind.TEXT, ParameterKind.NUMBER, ParameterKind.FLAG
+OF_FACTS = (
+    SkillParameter("battery_above", NUMBER, unit="0 to 1", least=0, most=1),
+    SkillParameter("battery_below", NUMBER, unit="0 to 1", least=0, most=1),
+    SkillParameter("standing", FLAG, description="no drive is under way"),
+    SkillParameter("in_room", TEXT, description="an id or a name", most=200),
+    SkillParameter("near", TEXT, description="a place", most=200),
+    SkillParameter("within_m", NUMBER, description="of near", default=1.0),
+    SkillParameter("event", TEXT, description="words of an event that lasts now", most=200),
+    SkillParameter("sees", TEXT, description="a thing that the detector reports now", most=200),
+    SkillParameter("time_from", TEXT, description="such as 22:00", most=5),
+    SkillParameter("time_until", TEXT, description="such as 06:00", most=5),
+    SkillParameter("not", FLAG, description="the opposite", default=False),
+)
+CONDITIONS = (
+    *OF_FACTS,
+    SkillParameter("value", TEXT, description="a result, such as {door.answer}", most=1000),
+    SkillParameter("is", TEXT, description="the wanted value", most=1000),
+    SkillParameter("above", NUMBER, description="of the value"),
+    SkillParameter("below", NUMBER, description="of the value"),
+)
+COMPARING = frozenset({"value", "is", "above", "below"})
+MODIFIERS = frozenset({"not", "within_m", "within_s"})
+
+
+class Facts(Protocol):
+    """The present facts, as far as the robot and its memory know; None is what is not known."""
+
+    @property
+    def now_s(self) -> float:
+        """Robot time."""
+
+    async def sleep(self, duration_s: float) -> None:
+        """Return when that much robot time has passed."""
+
+    def read_calendar(self) -> datetime | None:
+        """Return the operator's time; None where that is not known."""
+
+    async def fetch_battery(self) -> float | None:
+        """Return how full the battery is, from 0 to 1; None where nothing tells it."""
+
+    async def is_standing(self) -> bool:
+        """Return True while no drive is under way."""
+
+    async def is_in(self, room: str) -> bool | None:
+        """Return True where the robot is in a room, by its id or its name."""
+
+    async def is_near(self, place: str, within_m: float) -> bool | None:
+        """Return True where the robot is so near to a place, in a straight line."""
+
+    async def has_event(self, words: str) -> bool | None:
+        """Return True while an event lasts in whose words these stand."""
+
+    async def sees(self, label: str) -> bool | None:
+        """Return True where the robot's detector reports such a thing now."""
+
+
+async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
+    """Return the first condition that does not hold, by its name; empty where all hold.
+
+    What is not known does not hold, and neither does its opposite.
+
+    Raises:
+        SkillError: Nothing is wanted, or a time of day cannot be read.
+    """
+    named = [name for name in wanted if name not in MODIFIERS]
+    if not named:
+        raise SkillError(
+            "A condition needs something that is to hold.",
+            hint=f"Give one of: {', '.join(each.name for each in CONDITIONS)}.",
+        )
+    is_opposite = wanted.get("not", False)
+    for name in named:
+        holds = await _holds(name, wanted, facts)
+        if is_opposite and holds is False:
+            return {}
+        if not is_opposite and not holds:
+            return {name: wanted[name]}
+    return {"not": {name: wanted[name] for name in named}} if is_opposite else {}
+
+
+async def _holds(name: str, wanted: Arguments, facts: Facts) -> bool | None:
+    value = wanted[name]
+    holds: bool | None
+    match name:
+        case "battery_above" | "battery_below":
+            battery = await facts.fetch_battery()
+            key = name.removeprefix("battery_")
+            holds = None if battery is None else is_as_wanted(battery, {key: value})
+        case "standing":
+            holds = await facts.is_standing() is value
+        case "in_room":
+            holds = await facts.is_in(value)
+        case "near":
+            holds = await facts.is_near(value, wanted.get("within_m", 1.0))
+        case "event":
+            holds = await facts.has_event(value)
+        case "sees":
+            holds = await facts.sees(value)
+        case "time_from" | "time_until":
+            holds = _is_time(wanted, facts.read_calendar())
+        case _ if "value" not in wanted:
+            raise SkillError("is, above and below need a value.", hint="Write value: '{name}'.")
+        case _:
+            holds = is_as_wanted(wanted["value"], wanted)
+    return holds
+
+
+def is_as_wanted(value: JsonValue, wanted: Mapping[str, JsonValue]) -> bool:
+    """Return True where a value is what `is` says in any notation, and above and below numbers."""
+    equal, above, below = (wanted.get(key) for key in ("is", "above", "below"))
+    if equal is not None and plain(value).casefold() != plain(equal).casefold():
+        return False
+    if above is None and below is None:
+        return True
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        return False
+    return (above is None or number > above) and (below is None or number < below)
+
+
+def _is_time(wanted: Arguments, now: datetime | None) -> bool | None:
+    if now is None:
+        return None
+    begins = _minutes(wanted.get("time_from", "00:00"))
+    ends = _minutes(wanted.get("time_until", "24:00"))
+    minute = now.hour * 60 + now.minute
+    return begins <= minute < ends if begins < ends else minute >= begins or minute < ends
+
+
+def _minutes(said: str) -> int:
+    if said == "24:00":
+        return 24 * 60
+    try:
+        at = datetime.strptime(said, "%H:%M")  # noqa: DTZ007 - a time of day has no zone
+    except ValueError as error:
+        raise SkillError(f"{said!r} is no time of day.", hint="Write it as 22:00.") from error
+    return at.hour * 60 + at.minute
+
 
 LOOK_S = 0.05
 """Wall time between two looks at the robot's clock."""

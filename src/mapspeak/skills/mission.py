@@ -1,11 +1,11 @@
-"""A mission as a skill: one approval for all of it, one at a time, with its record."""
+"""Missions as skills: checked whole, approved once, one at a time, with their record."""
 
 import hashlib
 import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from contextvars import ContextVar
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,11 +18,167 @@ from mapspeak.safety import (
     current_caller,
     within_scope,
 )
-from mapspeak.skill import Arguments, JsonValue, OnProgress, Skill, SkillOutcome, SkillSpec
+from mapspeak.skill import (
+    Arguments,
+    JsonValue,
+    OnProgress,
+    Skill,
+    SkillEffect,
+    SkillOutcome,
+    SkillSpec,
+    SkillState,
+)
 from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.missiontree import Mission, MissionBounds, MissionChecker, MissionCourse, Step
+from mapspeak.skills.steps import Step, StepKind, find_names
+
+MOST_DRIVES = 1000
+MOST_NESTED = 5
+"""Missions within missions."""
+DRIVING = frozenset({"drive", "look"})
+"""The skills that send the robot to a place."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mission(Skill):
+    """A skill that is a tree of skills.
+
+    Attributes:
+        remember: Remarks of people about it since it was saved.
+        path: The file that it is saved in; None for one that is not.
+    """
+
+    tree: Step
+    remember: tuple[str, ...] = ()
+    path: Path | None = None
+
+
+@dataclass(slots=True)
+class MissionCourse:
+    """The course of one mission.
+
+    Attributes:
+        states: Of the leaves that have begun, by their numbers.
+    """
+
+    mission: Mission
+    given: Arguments
+    states: dict[int, SkillState] = field(default_factory=dict)
+    is_over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MissionBounds:
+    """The bounds of a mission.
+
+    Attributes:
+        asked: The skills in it for which a person is asked each time.
+        parts: The missions within it, as they were when it was checked.
+    """
+
+    n_drives: int = 0
+    n_commands: int = 0
+    asked: frozenset[str] = frozenset()
+    parts: Mapping[str, Mission] = field(default_factory=dict, compare=False)
+
+    def __add__(self, other: "MissionBounds") -> "MissionBounds":
+        return MissionBounds(
+            self.n_drives + other.n_drives,
+            self.n_commands + other.n_commands,
+            self.asked | other.asked,
+            {**self.parts, **other.parts},
+        )
+
+    def times(self, n: int) -> "MissionBounds":
+        """Return the bounds of that many repetitions."""
+        return MissionBounds(self.n_drives * n, self.n_commands * n, self.asked, self.parts)
+
+
+FindSkill = Callable[[str], Skill]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionChecker:
+    """Checks missions before anything moves.
+
+    Attributes:
+        find_skill: Raises `SkillError` for a name that it does not know.
+    """
+
+    find_skill: FindSkill
+
+    def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
+        """Return what a mission can do at most.
+
+        Args:
+            above: The missions that this one is within.
+
+        Raises:
+            SkillError: A part of it is unknown, not allowed, or does not fit.
+        """
+        within = (*above, mission.spec.name)
+        if mission.spec.name in above or len(above) >= MOST_NESTED:
+            way = " -> ".join(within)
+            raise SkillError(f"The mission holds itself: {way}.", hint="Leave one step out.")
+        names = {each.name for each in mission.spec.parameters}
+        bounds = self._check(mission.tree, names, within)
+        if bounds.n_drives > MOST_DRIVES:
+            raise SkillError(
+                f"The mission could drive {bounds.n_drives:,} times, the limit is {MOST_DRIVES:,}.",
+                hint="Repeat less often.",
+            )
+        return bounds
+
+    def _check(self, step: Step, names: set[str], within: tuple[str, ...]) -> MissionBounds:
+        """Check a step and the steps within; collect the names of its outputs."""
+        if step.kind is StepKind.LEAF:
+            return self._check_leaf(step, names, within)
+        parts = [self._check(each, names, within) for each in step.steps]
+        if step.kind is StepKind.PARALLEL and sum(part.n_drives > 0 for part in parts) > 1:
+            raise SkillError(
+                f"Step {step.number} drives to two places at once.",
+                hint="Let only one branch of a parallel step drive or look.",
+            )
+        return sum(parts, MissionBounds()).times(step.times)
+
+    def _check_leaf(self, step: Step, names: set[str], within: tuple[str, ...]) -> MissionBounds:
+        try:
+            skill = self.find_skill(step.skill)
+        except SkillError as error:
+            raise SkillError(f"Step {step.number}: {error.message}", hint=error.hint) from error
+        spec, what = skill.spec, f"Step {step.number} ({step.skill})"
+        given = step.name_arguments(spec)
+        for name in sorted(find_names(given) - names):
+            raise SkillError(
+                f"{what} uses {{{name}}}, which no step before gives.",
+                hint=f"There are: {', '.join(sorted(names)) or 'none'}. `as: {name}` gives it.",
+            )
+        _check_given(spec, given, what=what)
+        if step.output:
+            names.add(step.output)
+        if isinstance(skill, Mission):
+            inner = self.check(skill, within)
+            return inner + MissionBounds(parts={spec.name: skill})
+        drives, asks = step.skill in DRIVING, spec.is_always_asked
+        is_free = (spec.effect is SkillEffect.READS or drives) and not asks
+        asked = frozenset({step.skill} if asks else ())
+        return MissionBounds(int(drives), 0 if is_free else 2, asked)
+
+
+def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
+    """Check arguments as far as they are known before the mission runs.
+
+    Raises:
+        SkillError: They do not fit.
+    """
+    later = {name for name, value in given.items() if find_names(value)}
+    now = {name: value for name, value in given.items() if name not in later}
+    known_now = tuple(each for each in spec.parameters if each.name not in later)
+    check_arguments(known_now, now, skill=what)
+    if strangers := later - {each.name for each in spec.parameters}:
+        check_arguments(spec.parameters, dict.fromkeys(strangers), skill=what)
+
 
 MOST_TOLD = 160
 """Letters of the steps that a person is asked about; the tree has them all."""

@@ -22,9 +22,9 @@ from mapspeak.skill import (
     SkillState,
     failed,
 )
-from mapspeak.skills.conditions import Facts
-from mapspeak.skills.guarding import wait
-from mapspeak.skills.missiontree import FindSkill, MissionCourse, Step, StepKind, fill_in
+from mapspeak.skills.guarding import Facts, wait
+from mapspeak.skills.mission import FindSkill, MissionCourse
+from mapspeak.skills.steps import Step, StepKind, fill_in
 
 MOST_TOLD = 40
 """Steps of the account that are told; the record on disk has all."""

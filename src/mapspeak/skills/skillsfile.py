@@ -28,9 +28,8 @@ from mapspeak.skill import (
     failed,
 )
 from mapspeak.skills.arguments import check_arguments, check_value
-from mapspeak.skills.conditions import OF_FACTS, is_as_wanted
-from mapspeak.skills.missiontree import Step
-from mapspeak.skills.treereading import read_tree
+from mapspeak.skills.guarding import OF_FACTS, is_as_wanted
+from mapspeak.skills.steps import Step, read_tree
 
 NAME = r"^[a-z][a-z0-9_]{0,39}$"
 READY_MADE = ("nav2", "move_base")

@@ -22,8 +22,8 @@ from mapspeak.skill import (
     SkillParameter,
     SkillState,
 )
-from mapspeak.skills.conditions import CONDITIONS
-from mapspeak.skills.treereading import CONTROL
+from mapspeak.skills.guarding import CONDITIONS
+from mapspeak.skills.steps import CONTROL
 from missioning import missions
 from served import text_of
 from skillmaking import FakeSkill, never, spec

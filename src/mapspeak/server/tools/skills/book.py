@@ -11,18 +11,16 @@ from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.skills.board import SkillBoard
-from mapspeak.server.tools.skills.facts import SessionFacts
 from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
-from mapspeak.server.tools.skills.leaves import Leaves
+from mapspeak.server.tools.skills.leaves import Leaves, SessionFacts
 from mapspeak.session import Session
 from mapspeak.skill import Skill
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.mission import MissionDesk
+from mapspeak.skills.mission import Mission, MissionChecker, MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.missiontree import Mission, MissionChecker
-from mapspeak.skills.questions import QuestionBook
+from mapspeak.skills.runs import QuestionBook
 from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
-from mapspeak.skills.treereading import CONTROL
+from mapspeak.skills.steps import CONTROL
 
 logger = logging.getLogger(__name__)
 

@@ -16,11 +16,11 @@ from mapspeak.server.text.skills import (
     say_skills,
 )
 from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
+from mapspeak.server.tools.skills.board import say_run, tell_news
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.running import say_run, tell_news
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import JsonValue, ParameterKind, SkillSpec
-from mapspeak.skills.missiontree import Mission
+from mapspeak.skills.mission import Mission
 from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
@@ -31,7 +31,7 @@ from mapspeak.skills.skillsfile import (
     set_aside,
     write_mission,
 )
-from mapspeak.skills.treereading import parse_tree
+from mapspeak.skills.steps import parse_tree
 
 MOST_ARGUMENTS = 20
 Tree = Annotated[Any, WithJsonSchema({"type": "string", "description": "YAML or JSON"})]

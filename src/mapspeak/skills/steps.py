@@ -1,15 +1,81 @@
-"""A mission's tree read from what a model or a person wrote; each mistake with its place."""
+"""A mission as a tree of steps, read from what a model or a person wrote: faults by line."""
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import SkillError
-from mapspeak.skill import JsonValue
-from mapspeak.skills.missiontree import Step, StepKind
+from mapspeak.skill import Arguments, JsonValue, SkillSpec
+from mapspeak.skills.arguments import plain
+
+TEMPLATE = re.compile(r"\{([a-z][a-z0-9_]*)(?:\.([A-Za-z0-9_]+))?\}")
+
+
+class StepKind(StrEnum):
+    """How a step does the steps within it; a leaf runs a skill."""
+
+    SEQUENCE = "sequence"
+    FALLBACK = "fallback"
+    PARALLEL = "parallel"
+    RETRY = "retry"
+    TIMEOUT = "timeout_s"
+    REPEAT = "repeat"
+    EVERY = "every_min"
+    UNTIL = "until"
+    LEAF = "leaf"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One step of a mission.
+
+    Attributes:
+        number: Its place in the tree, from 1, as it is read.
+        steps: Those within it; of `UNTIL` the condition comes last.
+        limit: Seconds of `TIMEOUT`, minutes of `EVERY`.
+        times: The most repetitions of `RETRY`, `REPEAT`, `EVERY` and `UNTIL`.
+        needs_all: Of `PARALLEL`: else one that succeeds is enough.
+        skill: The name of the one that a leaf runs.
+        main: A leaf's argument for the first parameter of its skill; None where it names all.
+        arguments: A leaf's arguments by name; texts may hold "{name}" and "{name.field}".
+        output: The name under which a leaf's result is passed on; empty for none.
+    """
+
+    kind: StepKind
+    number: int
+    steps: tuple["Step", ...] = ()
+    limit: float = 0.0
+    times: int = 1
+    needs_all: bool = True
+    skill: str = ""
+    main: JsonValue = None
+    arguments: Arguments = field(default_factory=dict)
+    output: str = ""
+
+    def walk(self) -> Iterator["Step"]:
+        """Yield this step and all within it, in the order in which they are read."""
+        yield self
+        for each in self.steps:
+            yield from each.walk()
+
+    def name_arguments(self, spec: SkillSpec) -> dict[str, JsonValue]:
+        """Return a leaf's arguments by name.
+
+        Raises:
+            SkillError: The skill takes none.
+        """
+        if self.main is None:
+            return dict(self.arguments)
+        if not spec.parameters:
+            raise SkillError(f"{spec.name} takes nothing.", hint=f"Write only `{spec.name}`.")
+        return {spec.parameters[0].name: self.main, **self.arguments}
+
 
 MOST_STEPS = 300
 DEEPEST = 16
@@ -179,3 +245,50 @@ def _fault(written: object, what: str) -> SkillError:
 
 def _shown(value: object) -> str:
     return "a list" if isinstance(value, Mapping | list) else repr(value)[:MOST_NAME]
+
+
+def find_names(value: JsonValue) -> set[str]:
+    """Return the names that texts within a value want filled in."""
+    match value:
+        case str():
+            return {match[1] for match in TEMPLATE.finditer(value)}
+        case Mapping():
+            return find_names(list(value.values()))
+        case list() | tuple():
+            return {name for each in value for name in find_names(each)}
+    return set()
+
+
+def fill_in(value: JsonValue, values: Arguments) -> JsonValue:
+    """Return a value with what its texts name; a text that is one name alone becomes that value.
+
+    Raises:
+        SkillError: A result has no field of that name.
+    """
+    match value:
+        case str():
+            whole = TEMPLATE.fullmatch(value)
+            if whole is not None:
+                return _look_up(whole, values)
+            return TEMPLATE.sub(lambda match: plain(_look_up(match, values), ".6g"), value)
+        case Mapping():
+            return {name: fill_in(each, values) for name, each in value.items()}
+        case list() | tuple():
+            return [fill_in(each, values) for each in value]
+    return value
+
+
+def _look_up(match: re.Match[str], values: Arguments) -> JsonValue:
+    found, part = values.get(match[1]), match[2]
+    if not isinstance(found, Mapping):
+        if found is None or part is not None:
+            raise SkillError(
+                f"There is no {match[0]}.", hint="The step that gives it was not done."
+            )
+        return found
+    key = next(iter(found), None) if part is None else part
+    if key is None or key not in found:
+        raise SkillError(
+            f"There is no {match[0]}.", hint=f"{match[1]} has: {', '.join(found) or 'nothing'}."
+        )
+    return found[key]
