@@ -32,7 +32,7 @@ from mapspeak.rosbridge_server.rosapi import Parameters, add_rosapi
 from mapspeak.rosbridge_server.serving import serve_system
 from mapspeak.server.app import build_server
 from mapspeak.server.tools.ros.goals import RosAccess
-from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
+from mapspeak.server.tools.skills.interfaces import Interface, open_interface
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.skill import (
@@ -46,6 +46,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.arguments import schema_of
 from mapspeak.skills.layout import build_layout
+from mapspeak.skills.skillsfile import Called
 
 __all__ = ["measure"]
 
@@ -130,7 +131,7 @@ async def _publish_all(
     async def publish(topic: str, kind: str, message: dict[str, Any]) -> None:
         async with turns:
             try:
-                interface = Interface(InterfaceKind.PUBLISH, topic, kind)
+                interface = Interface(Called.PUBLISH, topic, kind)
                 skill = await open_interface(interface, ros, name="any")
                 given = json.loads(json.dumps(build_layout(book, kind).read(message)))
                 extra = {"for_s": 0.1} if interface.is_velocity else {}

@@ -1,6 +1,7 @@
 """Trees as models and people write them: read, checked, bounded, shown."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -13,9 +14,11 @@ from mapspeak.skill import (
     SkillEffect,
     SkillParameter,
 )
-from mapspeak.skills.mission import Mission, MissionBounds, MissionChecker
+from mapspeak.skills.guarding import SkillGate
+from mapspeak.skills.mission import Mission, MissionBounds, MissionDesk
+from mapspeak.skills.missionrecord import MissionRecord
 from mapspeak.skills.steps import Step, StepKind, fill_in, parse_tree, read_tree
-from skillmaking import FakeSkill, spec
+from skillmaking import FakeFacts, FakeSkill, spec
 
 
 def read(text: str) -> Step:
@@ -52,7 +55,11 @@ def check(tree: str, *parameters: str, more: dict[str, Skill] | None = None) -> 
             raise SkillError(f"There is no skill {name!r}.", hint="Did you mean another?")
         return known[name]
 
-    return MissionChecker(find).check(mission(tree, *parameters))
+    gate, record = (
+        SkillGate(FakeFacts(), None),
+        MissionRecord(Path("unused"), wall_clock=lambda: None),
+    )
+    return MissionDesk(find, gate, record).check(mission(tree, *parameters))
 
 
 def test_a_list_is_a_sequence_and_a_word_a_skill_that_is_given_nothing() -> None:

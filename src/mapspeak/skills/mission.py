@@ -38,6 +38,8 @@ MOST_NESTED = 5
 """Missions within missions."""
 DRIVING = frozenset({"drive", "look"})
 """The skills that send the robot to a place."""
+MOST_TOLD = 160
+"""Letters of the steps that a person is asked about; the tree has them all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,15 +100,27 @@ class MissionBounds:
 FindSkill = Callable[[str], Skill]
 
 
-@dataclass(frozen=True, slots=True)
-class MissionChecker:
-    """Checks missions before anything moves.
+# State of a task, not of the module: within a mission, the missions in it as they were approved.
+_PARTS: ContextVar[Mapping[str, Mission] | None] = ContextVar("parts", default=None)
+
+
+@dataclass(eq=False)
+class MissionDesk:
+    """Checks and runs the missions of one server.
 
     Attributes:
         find_skill: Raises `SkillError` for a name that it does not know.
+        gate: Lets a mission begin, and ends it in time.
+        record: On disk.
+        present: Marks a client as present: a mission needs no client while it runs.
+        latest: The course of the latest mission; None before the first.
     """
 
     find_skill: FindSkill
+    gate: SkillGate
+    record: MissionRecord
+    present: Callable[[], AbstractContextManager[None]] = nullcontext
+    latest: MissionCourse | None = None
 
     def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
         """Return what a mission can do at most.
@@ -165,55 +179,6 @@ class MissionChecker:
         asked = frozenset({step.skill} if asks else ())
         return MissionBounds(int(drives), 0 if is_free else 2, asked)
 
-
-def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
-    """Check arguments as far as they are known before the mission runs.
-
-    Raises:
-        SkillError: They do not fit.
-    """
-    later = {name for name, value in given.items() if find_names(value)}
-    now = {name: value for name, value in given.items() if name not in later}
-    known_now = tuple(each for each in spec.parameters if each.name not in later)
-    check_arguments(known_now, now, skill=what)
-    if strangers := later - {each.name for each in spec.parameters}:
-        check_arguments(spec.parameters, dict.fromkeys(strangers), skill=what)
-
-
-MOST_TOLD = 160
-"""Letters of the steps that a person is asked about; the tree has them all."""
-# State of a task, not of the module: within a mission, the missions in it as they were approved.
-_PARTS: ContextVar[Mapping[str, Mission] | None] = ContextVar("parts", default=None)
-
-
-class MissionDesk:
-    """Runs the missions of one server.
-
-    Args:
-        checker: Knows the skills.
-        gate: Lets a mission begin, and ends it in time.
-        record: On disk.
-        present: Marks a client as present: a mission needs no client while it runs.
-
-    Attributes:
-        latest: The course of the latest mission; None before the first.
-    """
-
-    def __init__(
-        self,
-        checker: MissionChecker,
-        gate: SkillGate,
-        record: MissionRecord,
-        *,
-        present: Callable[[], AbstractContextManager[None]] = nullcontext,
-    ) -> None:
-        self.check = checker.check
-        self.latest: MissionCourse | None = None
-        self._find_skill = checker.find_skill
-        self._gate = gate
-        self._record = record
-        self._present = present
-
     def open(
         self,
         spec: SkillSpec,
@@ -244,7 +209,7 @@ class MissionDesk:
         given = check_arguments(spec.parameters, arguments, skill=spec.name)
         if _PARTS.get() is not None:
             part = partial(self._go, MissionCourse(mission, given), on_progress)
-            return await self._gate.run_once(spec, part, command=None)
+            return await self.gate.run_once(spec, part, command=None)
         if self.latest is not None and not self.latest.is_over:
             under_way = self.latest.mission.spec.name
             raise SkillError(
@@ -252,13 +217,13 @@ class MissionDesk:
                 hint="Wait for its end, or cancel it.",
             )
         bounds = self.check(mission)
-        scope, guard = _scope_of(mission, given, bounds), self._gate.guard
+        scope, guard = _scope_of(mission, given, bounds), self.gate.guard
         self.latest = course = MissionCourse(mission, given)
         token = _PARTS.set(bounds.parts)
         try:
             acting = replace(current_caller(), mission=spec.name)
-            with self._present(), within_scope(scope), calling(acting):
-                return await self._gate.run_once(
+            with self.present(), within_scope(scope), calling(acting):
+                return await self.gate.run_once(
                     spec,
                     partial(self._go_recorded, course, on_progress),
                     command=RunSkill(
@@ -274,12 +239,12 @@ class MissionDesk:
 
     async def _go_recorded(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
         said = "cut off"
-        self._record.begin(course.mission.spec.name)
+        self.record.begin(course.mission.spec.name)
         try:
             outcome = await self._go(course, on_progress)
             said = str(outcome.state)
         finally:
-            self._record.end(said)
+            self.record.end(said)
         return outcome
 
     async def _go(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
@@ -287,24 +252,38 @@ class MissionDesk:
         from mapspeak.skills.missionrunner import MissionRunner  # noqa: PLC0415
 
         return await MissionRunner(
-            course,
+            course=course,
             find_skill=self._find_part,
-            facts=self._gate.facts,
+            facts=self.gate.facts,
             on_progress=on_progress,
-            on_step=self._record.note,
+            on_step=self.record.note,
         ).run()
 
     def _find_part(self, name: str) -> Skill:
         """Return a skill; a mission as it was approved, whatever its file says by now."""
-        return (_PARTS.get() or {}).get(name) or self._find_skill(name)
+        return (_PARTS.get() or {}).get(name) or self.find_skill(name)
 
     def _needs_word(self, spec: SkillSpec, bounds: MissionBounds) -> bool:
         """Return True where any part of it would need a person's word by itself."""
-        guard = self._gate.guard
+        guard = self.gate.guard
         kinds = frozenset() if guard is None else guard.policy.approval.kinds
         asks_to_drive = bounds.n_drives > 0 and CommandKind.DRIVE in kinds
         asks_for_more = bounds.n_commands > 0 and bool(kinds - {CommandKind.DRIVE})
         return spec.is_always_asked or bool(bounds.asked) or asks_to_drive or asks_for_more
+
+
+def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
+    """Check arguments as far as they are known before the mission runs.
+
+    Raises:
+        SkillError: They do not fit.
+    """
+    later = {name for name, value in given.items() if find_names(value)}
+    now = {name: value for name, value in given.items() if name not in later}
+    known_now = tuple(each for each in spec.parameters if each.name not in later)
+    check_arguments(known_now, now, skill=what)
+    if strangers := later - {each.name for each in spec.parameters}:
+        check_arguments(spec.parameters, dict.fromkeys(strangers), skill=what)
 
 
 def _scope_of(mission: Mission, given: Arguments, bounds: MissionBounds) -> ApprovalScope:

@@ -1,5 +1,6 @@
 """A mission run: its tree ticked by py_trees whenever a step has ended, its steps as tasks."""
 
+import math
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -43,10 +44,11 @@ class _Job:
     has_begun: bool = False
 
 
+@dataclass(eq=False, kw_only=True)
 class MissionRunner:
     """Runs one mission once.
 
-    Args:
+    Attributes:
         course: With a tree that was checked before, and no step begun.
         find_skill: Asked when a leaf begins: a skill may have gone meanwhile.
         facts: Tell the time.
@@ -54,32 +56,23 @@ class MissionRunner:
         on_step: Writes the record; it may not raise.
     """
 
-    def __init__(
-        self,
-        course: MissionCourse,
-        *,
-        find_skill: FindSkill,
-        facts: Facts,
-        on_progress: OnProgress,
-        on_step: OnStep,
-    ) -> None:
+    course: MissionCourse
+    find_skill: FindSkill
+    facts: Facts
+    on_progress: OnProgress
+    on_step: OnStep
+    _account: list[str] = field(default_factory=list)
+    _news: anyio.Event = field(default_factory=anyio.Event)
+    _tasks: TaskGroup | None = None
+    _ending: set[_Job] = field(default_factory=set)
+    _cut_off: SkillOutcome | None = None
+    _last: SkillOutcome = field(default_factory=failed)
+
+    def __post_init__(self) -> None:
         # py_trees prints its messages, and stdout belongs to the protocol.
         py_trees.logging.level = py_trees.logging.Level.ERROR
-        self._values: dict[str, JsonValue] = dict(course.given)
-        self._facts = facts
-        self._account: list[str] = []
-        self._find_skill = find_skill
-        self._on_progress = on_progress
-        self._on_step = on_step
-        self._news = anyio.Event()
-        self._tasks: TaskGroup | None = None
-        self._ending: set[_Job] = set()
-        self._cut_off: SkillOutcome | None = None
-        self._last: SkillOutcome = failed()
-        self._states = course.states
-        tree = course.mission.tree
-        self._given = [step.output for step in tree.walk() if step.output]
-        self._root = self._build(tree)
+        self._values: dict[str, JsonValue] = dict(self.course.given)
+        self._root = self._build(self.course.mission.tree)
 
     async def run(self) -> SkillOutcome:
         """Run it to its end; cancelling this call cancels its running steps, too."""
@@ -93,7 +86,8 @@ class MissionRunner:
             self._tasks.cancel_scope.cancel()
         if self._cut_off is not None:
             return self._cut_off
-        outputs = {name: self._values[name] for name in self._given if name in self._values}
+        given = (step.output for step in self.course.mission.tree.walk())
+        outputs = {name: self._values[name] for name in given if name in self._values}
         if self._root.status is Status.SUCCESS:
             return SkillOutcome(SkillState.SUCCEEDED, outputs=outputs)
         last = self._last
@@ -130,19 +124,19 @@ class MissionRunner:
         self.wake()
 
     async def _do_leaf(self, step: Step) -> bool:
-        self._states[step.number] = SkillState.RUNNING
+        self.course.states[step.number] = SkillState.RUNNING
         try:
-            skill = self._find_skill(step.skill)
+            skill = self.find_skill(step.skill)
             given = fill_in(step.name_arguments(skill.spec), self._values)
             self._tell(now=f"{step.number} {step.skill}")
             outcome = await skill.run(given, partial(self._take_progress, step))
         except anyio.get_cancelled_exc_class():
-            self._states[step.number] = SkillState.CANCELLED
+            self.course.states[step.number] = SkillState.CANCELLED
             self._note(f"{step.number} {step.skill}: cut off")
             raise
         except MapspeakError as error:
             outcome = failed(SkillCode.REJECTED, error.message)
-        self._states[step.number] = outcome.state
+        self.course.states[step.number] = outcome.state
         if step.output:
             self._values[step.output] = {**outcome.outputs, "ended": str(outcome.state)}
         self._note(_say_end(step, outcome))
@@ -155,14 +149,28 @@ class MissionRunner:
         return False
 
     async def _expire(self, limit_s: float) -> bool:
-        await wait(self._facts, limit_s)
+        await wait(self.facts, limit_s)
         return False
+
+    def _pace(self, period_s: float) -> Work:
+        """Return work that lets a period pass between two beginnings; the first comes at once."""
+        next_s = -math.inf
+
+        async def keep() -> bool:
+            nonlocal next_s
+            now_s = self.facts.now_s
+            begin_s = max(now_s, next_s)
+            next_s = begin_s + period_s
+            await self.facts.sleep(begin_s - now_s)
+            return True
+
+        return keep
 
     # --- what is told ---
 
     def _note(self, said: str) -> None:
         self._account.append(said)
-        self._on_step(said)
+        self.on_step(said)
         self._tell(now="")
 
     def _take_progress(self, step: Step, progress: SkillProgress) -> None:
@@ -174,7 +182,7 @@ class MissionRunner:
         self, *, now: str, is_asking: bool = False, values: Mapping[str, JsonValue] | None = None
     ) -> None:
         told = tuple(self._account[-MOST_TOLD:]) + ((f"now: {now}",) if now else ())
-        self._on_progress(SkillProgress(values=values or {}, is_asking=is_asking, account=told))
+        self.on_progress(SkillProgress(values=values or {}, is_asking=is_asking, account=told))
 
     # --- the tree ---
 
@@ -199,17 +207,15 @@ class MissionRunner:
                 expiring = _Work(name, partial(self._expire, step.limit), self)
                 node = Parallel(name, ONE(), children=[parts[0], expiring])
             case StepKind.EVERY:
-                pacing = _Work(name, _Pace(step.limit * 60, self._facts).keep, self)
-                once = Sequence(name, memory=True, children=[pacing, _whatever(parts[0])])
+                pacing = _Work(name, self._pace(step.limit * 60), self)
+                in_any_case = FailureIsSuccess(name, parts[0])
+                once = Sequence(name, memory=True, children=[pacing, in_any_case])
                 node = Repeat(name, once, step.times)
             case StepKind.UNTIL:
-                once = Sequence(name, memory=True, children=[_whatever(parts[0]), parts[1]])
+                in_any_case = FailureIsSuccess(name, parts[0])
+                once = Sequence(name, memory=True, children=[in_any_case, parts[1]])
                 node = Retry(name, once, step.times)
         return node
-
-
-def _whatever(inner: Behaviour) -> Behaviour:
-    return FailureIsSuccess(f"{inner.name} in any case", inner)
 
 
 def _say_end(step: Step, outcome: SkillOutcome) -> str:
@@ -221,23 +227,6 @@ def _say_end(step: Step, outcome: SkillOutcome) -> str:
     if outcome.quote:
         said += f' "{outcome.quote[:120]}"'
     return said[:MOST_LINE]
-
-
-@dataclass
-class _Pace:
-    """Lets a period pass between two beginnings; the first comes at once."""
-
-    period_s: float
-    facts: Facts
-    next_s: float | None = None
-
-    async def keep(self) -> bool:
-        """Wait for the next beginning."""
-        now_s = self.facts.now_s
-        begin_s = now_s if self.next_s is None else max(now_s, self.next_s)
-        self.next_s = begin_s + self.period_s
-        await self.facts.sleep(begin_s - now_s)
-        return True
 
 
 class _Work(Behaviour):

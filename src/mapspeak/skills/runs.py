@@ -10,6 +10,7 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError, SkillError
+from mapspeak.robot import CameraPicture
 from mapspeak.safety import current_caller
 from mapspeak.skill import (
     Arguments,
@@ -25,19 +26,6 @@ from mapspeak.skills.mission import Mission
 MOST_PICTURES = 12
 
 
-@dataclass(frozen=True, slots=True)
-class AskedPicture:
-    """A picture that questions may be about.
-
-    Attributes:
-        format: Such as "jpeg".
-    """
-
-    id: str
-    data: bytes
-    format: str
-
-
 @dataclass(eq=False)
 class Question:
     """A question that waits.
@@ -45,7 +33,7 @@ class Question:
     Attributes:
         id: Such as "Q1".
         client: The session that may answer it, as long as it is there; empty for anyone.
-        picture: Its subject; None where the mission has taken none.
+        picture: Its subject, and `picture_id`, such as "P3"; None where the mission has taken none.
         answer: None until one is given.
     """
 
@@ -53,7 +41,8 @@ class Question:
     text: str
     answers: tuple[str, ...]
     client: str
-    picture: AskedPicture | None
+    picture_id: str
+    picture: CameraPicture | None
     answer: str | None = None
     is_answered: anyio.Event = field(default_factory=anyio.Event)
 
@@ -65,11 +54,11 @@ class QuestionBook:
         self.waiting: list[Question] = []
         self._n_asked = 0
         self._gone: set[str] = set()
-        self._pictures: OrderedDict[str, AskedPicture] = OrderedDict()
+        self._pictures: OrderedDict[str, CameraPicture] = OrderedDict()
 
-    def keep(self, picture: AskedPicture) -> None:
+    def keep(self, picture_id: str, picture: CameraPicture) -> None:
         """Keep a picture that a mission has taken."""
-        self._pictures[picture.id] = picture
+        self._pictures[picture_id] = picture
         while len(self._pictures) > MOST_PICTURES:
             self._pictures.popitem(last=False)
 
@@ -78,9 +67,9 @@ class QuestionBook:
     ) -> Question:
         """Let a question wait, about a picture or the latest."""
         self._n_asked += 1
-        latest = next(reversed(self._pictures.values()), None)
-        shown = latest if picture is None else self._pictures.get(picture)
-        question = Question(f"Q{self._n_asked}", text, answers, client, shown)
+        about = next(reversed(self._pictures), "") if picture is None else picture
+        shown = self._pictures.get(about)
+        question = Question(f"Q{self._n_asked}", text, answers, client, about, shown)
         self.waiting.append(question)
         return question
 
@@ -145,6 +134,7 @@ logger = logging.getLogger(__name__)
 OnNews = Callable[["SkillRun"], Awaitable[None]]
 
 
+@dataclass(eq=False, kw_only=True)
 class SkillRun:
     """One run of a skill, as far as it has come; kept after its end.
 
@@ -157,22 +147,19 @@ class SkillRun:
         error: Why it could not be begun.
     """
 
-    def __init__(
-        self, handle: str, skill: Skill, *, client: str | None, n_stops_before: int
-    ) -> None:
-        self.handle = handle
-        self.skill = skill
-        self.client = client
-        self.n_stops_before = n_stops_before
-        self.progress: SkillProgress | None = None
-        self.n_progress = 0
-        self.outcome: SkillOutcome | None = None
-        self.error: MapspeakError | None = None
-        self._begun_s = anyio.current_time()
-        self._ended_s: float | None = None
-        self._scope = anyio.CancelScope()
-        self._news = anyio.Event()
-        self._why = SkillCode.CANCELLED
+    handle: str
+    skill: Skill
+    client: str | None
+    n_stops_before: int
+    progress: SkillProgress | None = None
+    n_progress: int = 0
+    outcome: SkillOutcome | None = None
+    error: MapspeakError | None = None
+    _begun_s: float = field(default_factory=anyio.current_time)
+    _ended_s: float | None = None
+    _scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
+    _news: anyio.Event = field(default_factory=anyio.Event)
+    _why: SkillCode = SkillCode.CANCELLED
 
     @property
     def is_over(self) -> bool:
@@ -306,9 +293,12 @@ class SkillRuns:
                 f"{MOST_AT_ONCE} skills are being run at once.", hint="Wait for one, or cancel it."
             )
         self._n_begun += 1
-        handle, n_stops = f"S{self._n_begun}", self._count_stops()
-        client = None if isinstance(skill, Mission) else current_caller().session
-        run = SkillRun(handle, skill, client=client, n_stops_before=n_stops)
+        run = SkillRun(
+            handle=(handle := f"S{self._n_begun}"),
+            skill=skill,
+            client=None if isinstance(skill, Mission) else current_caller().session,
+            n_stops_before=self._count_stops(),
+        )
         over = [each.handle for each in self._runs.values() if each.is_over]
         for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:
             del self._runs[old]

@@ -147,7 +147,7 @@ def draw_mission(mission: Mission) -> dict[str, JsonValue]:
 def say_question(question: Question) -> str:
     """Return a question with the answers that are taken."""
     taken = f" Answers: {', '.join(map(_say_value, question.answers))}." if question.answers else ""
-    about = "" if question.picture is None else f" About picture {question.picture.id}."
+    about = "" if question.picture is None else f" About picture {question.picture_id}."
     return f"{question.id}: {quote(question.text, most=MOST_SENTENCE)}.{taken}{about}"
 
 

@@ -211,7 +211,7 @@ class LiveSite:
         picture = next((each.picture for each in waiting if each.id == wanted), None)
         if picture is None:
             raise HTTPException(HTTPStatus.NOT_FOUND, "That question waits no longer.")
-        return Response(picture.data, media_type=f"image/{picture.format}")
+        return Response(picture.data, media_type=picture.media_type)
 
     async def unlock(self, request: Request) -> Response:
         """Give a key for the token that the server's terminal shows."""

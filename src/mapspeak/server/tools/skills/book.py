@@ -11,12 +11,12 @@ from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.skills.board import SkillBoard
-from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
+from mapspeak.server.tools.skills.interfaces import Interface, open_interface
 from mapspeak.server.tools.skills.leaves import Leaves, SessionFacts
 from mapspeak.session import Session
 from mapspeak.skill import Skill
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.mission import Mission, MissionChecker, MissionDesk
+from mapspeak.skills.mission import Mission, MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
 from mapspeak.skills.runs import QuestionBook
 from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
@@ -54,8 +54,7 @@ class SkillBook:
             logger.warning("The mission %s was interrupted: its server ended.", each.name)
         facts = SessionFacts(session, ros)
         self._gate = SkillGate(facts, session.guard)
-        checker = MissionChecker(self.find)
-        self.desk = MissionDesk(checker, self._gate, record, present=session.client_is_heard)
+        self.desk = MissionDesk(self.find, self._gate, record, session.client_is_heard)
         leaves = Leaves(session, facts, self.questions).list_skills()
         self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
         own = () if session.skilled is None else session.skilled.build_skills(session.robot)
@@ -183,7 +182,7 @@ class SkillBook:
         type_name = entry.type or await fetches.get(entry.calls, inquiry.fetch_topic_type)(name)
         if entry.definition and not await inquiry.connection.fetch_definitions(type_name):
             await inquiry.teach(type_name, entry.definition)
-        interface = Interface(InterfaceKind(entry.calls), name, type_name)
+        interface = Interface(entry.calls, name, type_name)
         return await open_interface(interface, self._ros, name=entry.name)
 
     async def check_entry(self, entry: OwnersEntry) -> str:

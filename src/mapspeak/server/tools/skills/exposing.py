@@ -18,7 +18,8 @@ from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import actions_of
 from mapspeak.server.tools.ros.services import find_folded
 from mapspeak.server.tools.skills.board import RESERVED, SkillBoard, name_tool
-from mapspeak.server.tools.skills.interfaces import Interface, InterfaceKind, open_interface
+from mapspeak.server.tools.skills.interfaces import Interface, open_interface
+from mapspeak.skills.skillsfile import Called
 
 MOST_EXPOSED = 100
 """Tools; a model that reads more of them reads nothing else."""
@@ -27,7 +28,7 @@ EVERY_S = 2.0
 KEPT_S = 20.0
 """Wall time for which a type, or the ends of a topic, are not asked for again while it is there."""
 PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
-PREFIXES = {InterfaceKind.PUBLISH: "publish_", InterfaceKind.READ: "read_"}
+PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
 Find = Callable[[str], Awaitable[list[Interface]]]
 
 logger = logging.getLogger(__name__)
@@ -159,18 +160,18 @@ class Exposure:
 
     async def _find_action(self, action: str) -> list[Interface]:
         kind = await self._ros.inquiry.fetch_action_type(action)
-        return [Interface(InterfaceKind.ACTION, action, bare_type(kind))]
+        return [Interface(Called.ACTION, action, bare_type(kind))]
 
     async def _find_service(self, service: str) -> list[Interface]:
         kind = await self._ros.inquiry.connection.fetch_service_type(service)
-        return [Interface(InterfaceKind.SERVICE, service, bare_type(kind))]
+        return [Interface(Called.SERVICE, service, bare_type(kind))]
 
     async def _find_sides(self, kind: str, topic: str) -> list[Interface]:
         """Return whether a topic is read or published on, by its other ends."""
         connection = self._ros.inquiry.connection
         ends = {
-            InterfaceKind.READ: await fetch_publishers(connection, topic),
-            InterfaceKind.PUBLISH: await fetch_subscribers(connection, topic),
+            Called.READ: await fetch_publishers(connection, topic),
+            Called.PUBLISH: await fetch_subscribers(connection, topic),
         }
         return [Interface(side, topic, bare_type(kind)) for side, end in ends.items() if end.others]
 

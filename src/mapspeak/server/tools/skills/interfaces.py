@@ -2,7 +2,6 @@
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import anyio
 
@@ -31,15 +30,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.arguments import check_arguments
 from mapspeak.skills.layout import MessageLayout, build_layout
-
-
-class InterfaceKind(StrEnum):
-    """The kinds of a robot's interfaces that can be skills."""
-
-    SERVICE = "service"
-    ACTION = "action"
-    PUBLISH = "publish"
-    READ = "read"
+from mapspeak.skills.skillsfile import Called
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +42,7 @@ class Interface:
         type: As "package/Type".
     """
 
-    kind: InterfaceKind
+    kind: Called
     name: str
     type: str
 
@@ -59,19 +50,19 @@ class Interface:
     def command(self) -> Act | Call | Publish | None:
         """What the policy sees of its use; None for one that is only read."""
         match self.kind:
-            case InterfaceKind.ACTION:
+            case Called.ACTION:
                 return Act(action=self.name, type=self.type, goal={}, true_type=self.type)
-            case InterfaceKind.SERVICE:
+            case Called.SERVICE:
                 return Call(service=self.name, type=self.type, arguments={})
-            case InterfaceKind.PUBLISH:
+            case Called.PUBLISH:
                 return Publish(topic=self.name, type=self.type, message={})
-            case InterfaceKind.READ:
+            case _:
                 return None
 
     @property
     def is_velocity(self) -> bool:
         """True for a topic on which a robot goes on until it is told otherwise."""
-        return self.kind is InterfaceKind.PUBLISH and self.type in VELOCITIES
+        return self.kind is Called.PUBLISH and self.type in VELOCITIES
 
 
 LOOK_S = 0.2
@@ -175,7 +166,7 @@ class _Opened:
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)
         given.pop(DURATION.name, None)
         message = self.described.check(self.sent.build(given))
-        if self.interface.kind is not InterfaceKind.SERVICE:
+        if self.interface.kind is not Called.SERVICE:
             await check_frames(self.ros.inquiry, message)
         return message
 
@@ -215,10 +206,10 @@ class _Way:
 
 
 WAYS = {
-    InterfaceKind.SERVICE: _Way("srv", "calls", 15.0, _Opened.call),
-    InterfaceKind.ACTION: _Way("action", "sends a goal to", 600.0, _Opened.act),
-    InterfaceKind.PUBLISH: _Way("msg", "publishes on", 25.0, _Opened.publish),
-    InterfaceKind.READ: _Way("msg", "reads", 10.0, _Opened.read),
+    Called.SERVICE: _Way("srv", "calls", 15.0, _Opened.call),
+    Called.ACTION: _Way("action", "sends a goal to", 600.0, _Opened.act),
+    Called.PUBLISH: _Way("msg", "publishes on", 25.0, _Opened.publish),
+    Called.READ: _Way("msg", "reads", 10.0, _Opened.read),
 }
 
 
@@ -234,7 +225,7 @@ async def open_interface(
     Raises:
         LinkError: Its type is not described, or cannot be.
     """
-    way, reads = WAYS[interface.kind], interface.kind is InterfaceKind.READ
+    way, reads = WAYS[interface.kind], interface.kind is Called.READ
     described = await ros.inquiry.describe(interface.type, kind=way.type_kind)
     sent = build_layout(described.book, described.parts[0], reserved=reserved)
     parameters = () if reads else sent.parameters

@@ -32,7 +32,7 @@ from mapspeak.skill import (
     succeeded,
 )
 from mapspeak.skills.guarding import CONDITIONS, Facts, end_within, find_unmet
-from mapspeak.skills.runs import AskedPicture, QuestionBook
+from mapspeak.skills.runs import QuestionBook
 
 BATTERY = "sensor_msgs/BatteryState"
 HEAR_S = 3.0
@@ -271,10 +271,9 @@ class Leaves:
                     if outcome.state is not SkillState.SUCCEEDED:
                         return outcome
         sighting = await look_ahead(session, camera)
-        taken, picture = session.pictures.latest, sighting.picture
+        taken = session.pictures.latest
         picture_id = "" if taken is None else taken.id
-        media = picture.media_type.partition("/")[2]
-        self._questions.keep(AskedPicture(picture_id, picture.data, media))
+        self._questions.keep(picture_id, sighting.picture)
         seen = ", ".join(each.label for each in sighting.detections)
         return succeeded(picture=picture_id, seen=seen)
 

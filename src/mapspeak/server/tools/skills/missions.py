@@ -124,7 +124,8 @@ class MissionTools:
             return [f"{found.id} is answered: {taken}."]
         shown: list[str | Image] = [say_question(found)]
         if found.picture is not None:
-            shown.append(Image(data=found.picture.data, format=found.picture.format))
+            media = found.picture.media_type.partition("/")[2]
+            shown.append(Image(data=found.picture.data, format=media))
         return shown
 
     @tool("Save a mission", ToolEffect.REMEMBERS)
