@@ -10,20 +10,34 @@ from typing import Any
 from mapspeak.errors import SkillError
 from mapspeak.memory.quoting import quote
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillParameter
-from mapspeak.skills.layout import MOST_TEXT
 
 MOST_SHOWN = 60
 FLAGS = {"true": True, "false": False}
 NUMBERS = (ParameterKind.NUMBER, ParameterKind.WHOLE)
-WANTED = {
-    ParameterKind.NUMBER: "a number",
-    ParameterKind.WHOLE: "a whole number",
-    ParameterKind.TEXT: "a text",
-    ParameterKind.BYTES: "bytes in base64",
-    ParameterKind.FLAG: "true or false",
-    ParameterKind.LIST: "a list",
-    ParameterKind.OBJECT: "an object",
+KINDS = {
+    ParameterKind.NUMBER: ("number", "a number"),
+    ParameterKind.WHOLE: ("integer", "a whole number"),
+    ParameterKind.TEXT: ("string", "a text"),
+    ParameterKind.BYTES: ("string", "bytes in base64"),
+    ParameterKind.FLAG: ("boolean", "true or false"),
+    ParameterKind.LIST: ("array", "a list"),
+    ParameterKind.OBJECT: ("object", "an object"),
 }
+"""What each is called in a schema, and in a fault."""
+LIMITS = {
+    ParameterKind.NUMBER: ("minimum", "maximum"),
+    ParameterKind.WHOLE: ("minimum", "maximum"),
+    ParameterKind.TEXT: ("minLength", "maxLength"),
+    ParameterKind.LIST: ("minItems", "maxItems"),
+}
+LARGEST_SAID = 2**16
+"""Beyond it the limits of a whole number or a text say no more than that it is one."""
+Schema = dict[str, Any]
+MOST_SCHEMA = 4_000
+"""Bytes; of a longer one the messages within lists are told by the names of their fields."""
+MOST_DESCRIPTION = 160
+MOST_NAMED = 12
+FULL_DEPTH = 8
 
 
 def check_arguments(
@@ -100,7 +114,7 @@ def say_wanted(parameter: SkillParameter) -> str:
     """Return what a parameter takes, such as "a number from 0 to 0.085 m"."""
     if parameter.choices:
         return f"one of {', '.join(map(str, parameter.choices))}"
-    wanted, least, most = WANTED[parameter.kind], parameter.least, parameter.most
+    wanted, least, most = KINDS[parameter.kind][1], parameter.least, parameter.most
     if parameter.kind in NUMBERS:
         unit = f" {parameter.unit}" if parameter.unit else ""
         from_least = "" if least is None else f" from {least:.15g}"
@@ -142,26 +156,6 @@ def _number(parameter: SkillParameter, value: JsonValue) -> JsonValue | None:
     return value if _is_within(parameter, value) else None
 
 
-Schema = dict[str, Any]
-
-MOST_SCHEMA = 4_000
-"""Bytes; of a longer one the messages within lists are told by the names of their fields."""
-MOST_DESCRIPTION = 160
-MOST_NAMED = 12
-FULL_DEPTH = 8
-LARGEST_SAID = 2**16
-"""Beyond it the limits of a whole number say no more than that it is one."""
-TYPES = {
-    ParameterKind.NUMBER: "number",
-    ParameterKind.WHOLE: "integer",
-    ParameterKind.TEXT: "string",
-    ParameterKind.BYTES: "string",
-    ParameterKind.FLAG: "boolean",
-    ParameterKind.LIST: "array",
-    ParameterKind.OBJECT: "object",
-}
-
-
 def schema_of(parameters: Iterable[SkillParameter]) -> Schema:
     """Return the schema of the arguments."""
     told = tuple(parameters)
@@ -182,16 +176,17 @@ def _object(parameters: tuple[SkillParameter, ...], depth: int) -> Schema:
 
 
 def _schema(parameter: SkillParameter, depth: int) -> Schema:
-    schema: Schema = {"type": TYPES[parameter.kind]}
-    match parameter.kind:
-        case ParameterKind.LIST:
-            schema |= _list(parameter, depth)
-        case ParameterKind.OBJECT if depth > 0:
-            schema |= _object(parameter.fields, depth - 1)
-        case ParameterKind.NUMBER | ParameterKind.WHOLE:
-            schema |= _limits(parameter)
-        case ParameterKind.TEXT if parameter.most not in (None, MOST_TEXT):
-            schema["maxLength"] = parameter.most
+    schema: Schema = {"type": KINDS[parameter.kind][0]}
+    if parameter.item is not None:
+        schema["items"] = _schema(parameter.item, depth - 1)
+    if parameter.kind is ParameterKind.OBJECT and depth > 0:
+        schema |= _object(parameter.fields, depth - 1)
+    for name, limit in zip(
+        LIMITS.get(parameter.kind, ()), (parameter.least, parameter.most), strict=False
+    ):
+        if limit is not None and abs(limit) <= LARGEST_SAID:
+            is_count = parameter.kind not in NUMBERS
+            schema[name] = int(limit) if is_count else limit
     if parameter.choices:
         schema["enum"] = list(parameter.choices)
     if parameter.default is not None:
@@ -200,29 +195,11 @@ def _schema(parameter: SkillParameter, depth: int) -> Schema:
     return schema | ({"description": said} if said else {})
 
 
-def _list(parameter: SkillParameter, depth: int) -> Schema:
-    schema: Schema = {} if parameter.item is None else {"items": _schema(parameter.item, depth - 1)}
-    if parameter.least:
-        schema["minItems"] = int(parameter.least)
-    if parameter.most is not None:
-        schema["maxItems"] = int(parameter.most)
-    return schema
-
-
-def _limits(parameter: SkillParameter) -> Mapping[str, float]:
-    limits = {"minimum": parameter.least, "maximum": parameter.most}
-    return {
-        name: limit
-        for name, limit in limits.items()
-        if limit is not None and abs(limit) <= LARGEST_SAID
-    }
-
-
 def _describe(parameter: SkillParameter, depth: int) -> str:
     """Return unit, kind and the owner's words; these are quoted, for they may say anything."""
     parts = [parameter.unit]
     if parameter.kind is ParameterKind.BYTES:
-        parts.append(WANTED[ParameterKind.BYTES])
+        parts.append(KINDS[ParameterKind.BYTES][1])
     if parameter.description:
         parts.append(quote(parameter.description, most=MOST_DESCRIPTION))
     if parameter.kind is ParameterKind.OBJECT and depth <= 0:

@@ -4,7 +4,6 @@ import base64
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import islice
 from typing import Any
 
@@ -54,45 +53,41 @@ UNITS = {
 """Of the fields of well-known types; a field that is a message hands its own on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Slot:
-    """A parameter and where in the message its value belongs."""
-
-    parameter: SkillParameter
-    path: tuple[str, ...]
-
-
 @dataclass(frozen=True)
 class MessageLayout:
-    """A message type as the parameters of a skill; `build_layout` makes one."""
+    """A message type as the parameters of a skill; `build_layout` makes one.
 
-    slots: tuple[Slot, ...]
+    Attributes:
+        slots: The parameters by where in the message their values belong, in the fields' order.
+    """
 
-    @cached_property
+    slots: Mapping[tuple[str, ...], SkillParameter]
+
+    @property
     def parameters(self) -> tuple[SkillParameter, ...]:
         """The parameters, in the order of the fields."""
-        return tuple(slot.parameter for slot in self.slots)
+        return tuple(self.slots.values())
 
     def build(self, arguments: Mapping[str, JsonValue]) -> dict[str, Any]:
         """Return the message with some arguments; missing ones stay out."""
         message: dict[str, Any] = {}
-        for slot in self.slots:
-            if slot.parameter.name in arguments:
+        for (*above, last), parameter in self.slots.items():
+            if parameter.name in arguments:
                 inner = message
-                for part in slot.path[:-1]:
+                for part in above:
                     inner = inner.setdefault(part, {})
-                inner[slot.path[-1]] = arguments[slot.parameter.name]
+                inner[last] = arguments[parameter.name]
         return message
 
     def read(self, message: Message) -> dict[str, JsonValue]:
         """Return a message as arguments that would build it; large lists by their length."""
         found: dict[str, JsonValue] = {}
-        for slot in self.slots:
+        for path, parameter in self.slots.items():
             value: Any = message
-            for part in slot.path:
+            for part in path:
                 value = value.get(part) if isinstance(value, Mapping) else None
             if value is not None:
-                found[slot.parameter.name] = _read_value(slot.parameter, value)
+                found[parameter.name] = _read_value(parameter, value)
         return found
 
 
@@ -141,20 +136,18 @@ def build_layout(
     builder = _Builder(book)
     message = book[bare_type(type_name)]
     builder.check(message, above=())
-    leaves = list(islice(builder.leaves(message, path=(), unit=""), MOST_FLAT + 1))
+    leaves = dict(islice(builder.leaves(message, path=(), unit=""), MOST_FLAT + 1))
     if len(leaves) > MOST_FLAT:
-        leaves = [builder.leaf(message, each, (each.name,), "") for each in message.fields]
-    return MessageLayout(tuple(_with_names(leaves, reserved)))
-
-
-def _with_names(leaves: list[Slot], reserved: frozenset[str]) -> Iterator[Slot]:
-    """Name each parameter by its path; where that says two things, with two low lines between."""
-    joined = ["_".join(leaf.path) for leaf in leaves]
-    glue = "_" if len(set(joined)) == len(joined) else "__"
-    for leaf in leaves:
-        name = glue.join(leaf.path)
-        named = f"its_{name}" if name in reserved else name
-        yield Slot(replace(leaf.parameter, name=named), leaf.path)
+        leaves = {(each.name,): builder.parameter(message, each, "") for each in message.fields}
+    # Where two paths joined by one low line are the same, two stand between their parts.
+    glue = "_" if len({"_".join(path) for path in leaves}) == len(leaves) else "__"
+    names = {path: glue.join(path) for path in leaves}
+    return MessageLayout(
+        {
+            path: replace(leaf, name=f"its_{name}" if (name := names[path]) in reserved else name)
+            for path, leaf in leaves.items()
+        }
+    )
 
 
 class _Builder:
@@ -185,7 +178,9 @@ class _Builder:
             self.check(self._book[field.type], above=inside)
         self._checked.add(message.name)
 
-    def leaves(self, message: MessageType, *, path: tuple[str, ...], unit: str) -> Iterator[Slot]:
+    def leaves(
+        self, message: MessageType, *, path: tuple[str, ...], unit: str
+    ) -> Iterator[tuple[tuple[str, ...], SkillParameter]]:
         """Yield the fields of a message that are no messages themselves, all the way down."""
         for field in message.fields:
             inner = self._inner(field)
@@ -193,13 +188,10 @@ class _Builder:
             if inner is not None and field.length is None:
                 yield from self.leaves(inner, path=where, unit=self._unit(message, field, unit))
             else:
-                yield self.leaf(message, field, where, unit)
+                yield where, self.parameter(message, field, unit)
 
-    def leaf(self, message: MessageType, field: Field, path: tuple[str, ...], unit: str) -> Slot:
+    def parameter(self, message: MessageType, field: Field, unit: str) -> SkillParameter:
         """Return a field as one parameter, whatever it holds."""
-        return Slot(self._parameter(message, field, unit), path)
-
-    def _parameter(self, message: MessageType, field: Field, unit: str) -> SkillParameter:
         self._n_described += 1
         if self._n_described > MOST_DESCRIBED:
             raise LinkError(
@@ -207,44 +199,34 @@ class _Builder:
                 hint="No model could fill it in: leave it out.",
             )
         unit = self._unit(message, field, unit)
-        remark = self._remark(message, field)
+        name, remark = field.name, self._remark(message, field)
         if field.length is None:
-            return self._one(field, name=field.name, unit=unit, remark=remark)
+            return replace(self._one(field, unit), name=name, description=remark)
         longest = field.length or field.most or MOST_LISTED
         if field.type == "uint8" and longest > MOST_IN_LIST:
-            return SkillParameter(
-                name=field.name, kind=ParameterKind.BYTES, description=remark, most=MOST_TEXT
-            )
+            return SkillParameter(name, ParameterKind.BYTES, description=remark, most=MOST_TEXT)
         return SkillParameter(
-            name=field.name,
-            kind=ParameterKind.LIST,
+            name,
+            ParameterKind.LIST,
             description=remark,
             unit=unit,
             least=field.length or None,
             most=longest,
-            item=self._one(field, name="", unit="", remark=""),
+            item=self._one(field, ""),
         )
 
-    def _one(self, field: Field, *, name: str, unit: str, remark: str) -> SkillParameter:
-        """Return a field, or one of its list, as a parameter."""
+    def _one(self, field: Field, unit: str) -> SkillParameter:
+        """Return a field, or one of its list, as a parameter without a name."""
         inner = self._inner(field)
         if inner is not None:
-            fields = tuple(self._parameter(inner, each, unit) for each in inner.fields)
-            kind = ParameterKind.OBJECT
-            return SkillParameter(name=name, kind=kind, description=remark, fields=fields)
+            fields = tuple(self.parameter(inner, each, unit) for each in inner.fields)
+            return SkillParameter("", ParameterKind.OBJECT, fields=fields)
         default = self._book.default(field) if field.default and field.length is None else None
         least, most = WHOLES.get(field.type, (None, None))
         if field.type in TEXTS:
             most = field.most_letters or MOST_TEXT
-        return SkillParameter(
-            name=name,
-            kind=_kind_of(field),
-            description=remark,
-            unit=unit,
-            least=least,
-            most=most,
-            default=default,
-        )
+        kind = _kind_of(field)
+        return SkillParameter("", kind, unit=unit, least=least, most=most, default=default)
 
     def _inner(self, field: Field) -> MessageType | None:
         is_inner = field.is_message or field.type in TIMES

@@ -5,7 +5,6 @@ import logging
 import math
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
-from functools import partial
 
 import anyio
 
@@ -29,7 +28,6 @@ KEPT_S = 20.0
 """Wall time for which a type, or the ends of a topic, are not asked for again while it is there."""
 PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
 PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
-Find = Callable[[str], Awaitable[list[Interface]]]
 
 logger = logging.getLogger(__name__)
 
@@ -61,7 +59,7 @@ class Exposure:
         self._every_s = every_s
         self._offered: dict[Interface, str] = {}
         self._left_out: set[Interface] = set()
-        self._answers: dict[tuple[str, str], tuple[list[Interface], float]] = {}
+        self._answers: dict[tuple[Called, str], tuple[list[Interface], float]] = {}
 
     async def keep_looking(self) -> None:
         """Look again and again; a robot out of reach keeps its tools until it is back.
@@ -135,45 +133,49 @@ class Exposure:
             for name in await connection.fetch_services()
             if name in self._patterns or not _is_everybodys(name)
         ]
-        asked: dict[tuple[str, str], Find] = {
-            **{("action", name): self._find_action for name in actions_of(graph)},
-            **{("service", name): self._find_service for name in services},
-            **{("topic", name): partial(self._find_sides, kind) for name, kind in _topics(graph)},
+        types = {
+            **{(Called.ACTION, name): "" for name in actions_of(graph)},
+            **{(Called.SERVICE, name): "" for name in services},
+            **{(Called.READ, name): kind for name, kind in _topics(graph)},
         }
-        self._answers = {key: each for key, each in self._answers.items() if key in asked}
+        self._answers = {key: each for key, each in self._answers.items() if key in types}
         return [
             each
-            for key, find in asked.items()
-            if any(fnmatch.fnmatchcase(key[1], pattern) for pattern in self._patterns)
-            for each in await self._ask(key, find)
+            for (called, name), kind in types.items()
+            if any(fnmatch.fnmatchcase(name, pattern) for pattern in self._patterns)
+            for each in await self._ask(called, name, kind)
         ]
 
-    async def _ask(self, key: tuple[str, str], find: Find) -> list[Interface]:
+    async def _ask(self, called: Called, name: str, kind: str) -> list[Interface]:
         """Return what is found for a name; reuse a recent answer, or at an error the last one."""
-        known, asked_s = self._answers.get(key, ([], -math.inf))
+        known, asked_s = self._answers.get((called, name), ([], -math.inf))
         if anyio.current_time() < asked_s + KEPT_S:
             return known
         with suppress(LinkError):
-            known = await find(key[1])
-        self._answers[key] = (known, anyio.current_time())
+            known = await self._fetch(called, name, kind)
+        self._answers[called, name] = (known, anyio.current_time())
         return known
 
-    async def _find_action(self, action: str) -> list[Interface]:
-        kind = await self._ros.inquiry.fetch_action_type(action)
-        return [Interface(Called.ACTION, action, bare_type(kind))]
+    async def _fetch(self, called: Called, name: str, kind: str) -> list[Interface]:
+        """Return an action or a service; or whether a topic is read or published on, by its ends.
 
-    async def _find_service(self, service: str) -> list[Interface]:
-        kind = await self._ros.inquiry.connection.fetch_service_type(service)
-        return [Interface(Called.SERVICE, service, bare_type(kind))]
-
-    async def _find_sides(self, kind: str, topic: str) -> list[Interface]:
-        """Return whether a topic is read or published on, by its other ends."""
-        connection = self._ros.inquiry.connection
-        ends = {
-            Called.READ: await fetch_publishers(connection, topic),
-            Called.PUBLISH: await fetch_subscribers(connection, topic),
-        }
-        return [Interface(side, topic, bare_type(kind)) for side, end in ends.items() if end.others]
+        Args:
+            kind: The type of a topic, which the robot's graph tells.
+        """
+        inquiry = self._ros.inquiry
+        match called:
+            case Called.ACTION:
+                kind = await inquiry.fetch_action_type(name)
+            case Called.SERVICE:
+                kind = await inquiry.connection.fetch_service_type(name)
+            case _:
+                ends = {
+                    Called.READ: await fetch_publishers(inquiry.connection, name),
+                    Called.PUBLISH: await fetch_subscribers(inquiry.connection, name),
+                }
+                others = (side for side, end in ends.items() if end.others)
+                return [Interface(side, name, bare_type(kind)) for side in others]
+        return [Interface(called, name, bare_type(kind))]
 
 
 def _is_everybodys(service: str) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import anyio
 
@@ -236,9 +237,4 @@ async def open_interface(
         timeout_s=way.timeout_s,
         parameters=(*parameters, DURATION) if interface.is_velocity else parameters,
     )
-    opened = _Opened(interface, ros, described, sent, spec)
-
-    async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
-        return await way.run(opened, arguments, on_progress)
-
-    return Skill(spec, run)
+    return Skill(spec, partial(way.run, _Opened(interface, ros, described, sent, spec)))
