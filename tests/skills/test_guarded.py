@@ -146,8 +146,9 @@ async def test_arguments_that_do_not_fit_are_refused_before_anything_else(tmp_pa
     width = SkillParameter("width", ParameterKind.NUMBER, most=0.1, is_required=True)
     skill = FakeSkill(spec(parameters=(width,)))
     guarded = SkillGate(FakeFacts(), make_guard(tmp_path)).hold(skill)
-    with pytest.raises(SkillError, match="width"):
-        await guarded.run({"width": 2}, tell_nobody)
+    for wrong in (2, 10**400, float("nan"), "wide"):
+        with pytest.raises(SkillError, match="width"):
+            await guarded.run({"width": wrong}, tell_nobody)
     assert (skill.given, list(audit_of(tmp_path))) == ([], [])
 
 

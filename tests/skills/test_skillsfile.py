@@ -18,7 +18,7 @@ from mapspeak.skills.skillsfile import (
     OwnersEntry,
     add_correction,
     load_skills,
-    write_mission,
+    write_skills,
 )
 from skillmaking import FakeSkill, spec, tell_nobody
 
@@ -154,7 +154,7 @@ async def test_fixed_and_free_arguments_reach_what_is_called_and_its_result_is_j
 
 def test_a_mission_is_written_anew_as_a_whole(tmp_path: Path) -> None:
     path, before = tmp_path / "round.yaml", tmp_path / "before"
-    write_mission(path, {"name": "round", "mission": [{"wait": 1}]})
+    write_skills(path, {"skills": [{"name": "round", "mission": [{"wait": 1}]}]})
     before.hardlink_to(path)
     add_correction(path, "round", "knock first")
     assert "knock first" in path.read_text()

@@ -2,7 +2,7 @@
 
 import difflib
 import json
-import math
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -146,7 +146,7 @@ def _number(parameter: SkillParameter, value: JsonValue) -> JsonValue | None:
             with suppress(ValueError):
                 value = read(said)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value):
+    if not is_number or not abs(value) <= sys.float_info.max:
         return None
     if parameter.kind is ParameterKind.WHOLE:
         # Models write 3.0 for 3.

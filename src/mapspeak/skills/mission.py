@@ -113,6 +113,7 @@ class MissionDesk:
         gate: Lets a mission begin, and ends it in time.
         record: On disk.
         present: Marks a client as present: a mission needs no client while it runs.
+        begins: Called as a mission begins.
         latest: The course of the latest mission; None before the first.
     """
 
@@ -120,6 +121,7 @@ class MissionDesk:
     gate: SkillGate
     record: MissionRecord
     present: Callable[[], AbstractContextManager[None]] = nullcontext
+    begins: Callable[[], None] = lambda: None
     latest: MissionCourse | None = None
 
     def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
@@ -219,6 +221,7 @@ class MissionDesk:
         bounds = self.check(mission)
         scope, guard = _scope_of(mission, given, bounds), self.gate.guard
         self.latest = course = MissionCourse(mission, given)
+        self.begins()
         token = _PARTS.set(bounds.parts)
         try:
             acting = replace(current_caller(), mission=spec.name)

@@ -62,6 +62,10 @@ class QuestionBook:
         while len(self._pictures) > MOST_PICTURES:
             self._pictures.popitem(last=False)
 
+    def forget_pictures(self) -> None:
+        """Forget the pictures of the mission before."""
+        self._pictures.clear()
+
     def put(
         self, text: str, answers: tuple[str, ...], *, picture: str | None, client: str
     ) -> Question:

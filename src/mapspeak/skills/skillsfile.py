@@ -268,15 +268,6 @@ def load_skills(path: Path) -> tuple[OwnersEntry, ...]:
     return tuple(entries)
 
 
-def write_mission(path: Path, written: Arguments) -> None:
-    """Write a file with one mission, as its owner would have.
-
-    Raises:
-        ConfigError: It could not be written.
-    """
-    _write(path, {"skills": [dict(written)]})
-
-
 def add_correction(path: Path, name: str, correction: str) -> None:
     """Keep a person's remark about a skill in its file, and leave the rest as it is written there.
 
@@ -290,10 +281,15 @@ def add_correction(path: Path, name: str, correction: str) -> None:
     for each in tree["skills"]:
         if each["name"] == name:
             each.setdefault("remember", []).append(correction)
-    _write(path, tree)
+    write_skills(path, tree)
 
 
-def _write(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
+def write_skills(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
+    """Write a file of skills, as its owner would have.
+
+    Raises:
+        ConfigError: It could not be written.
+    """
     text = io.StringIO()
     YAML(typ="rt").dump(tree, text)
     try:

@@ -138,6 +138,16 @@ async def test_a_question_waits_for_an_answer_with_its_picture(tmp_path: Path) -
     assert "No mission waits" in nothing
 
 
+async def test_a_question_of_a_mission_that_took_no_picture_has_none_of_an_earlier_one(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        await caller.ask("run_mission", tree="- look\n")
+        await caller.ask("run_mission", tree="- ask: Is it tidy?\n")
+        shown = await caller.client.call_tool("answer_mission", {})
+    assert [each.type for each in shown.content] == ["text"]
+
+
 async def test_a_question_that_nobody_answers_has_the_answer_its_asker_gave(
     tmp_path: Path,
 ) -> None:

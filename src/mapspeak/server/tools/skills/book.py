@@ -54,7 +54,8 @@ class SkillBook:
             logger.warning("The mission %s was interrupted: its server ended.", each.name)
         facts = SessionFacts(session, ros)
         self._gate = SkillGate(facts, session.guard)
-        self.desk = MissionDesk(self.find, self._gate, record, session.client_is_heard)
+        present, begins = session.client_is_heard, self.questions.forget_pictures
+        self.desk = MissionDesk(self.find, self._gate, record, present, begins)
         leaves = Leaves(session, facts, self.questions).list_skills()
         self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
         own = () if session.skilled is None else session.skilled.build_skills(session.robot)

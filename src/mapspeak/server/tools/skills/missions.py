@@ -29,7 +29,7 @@ from mapspeak.skills.skillsfile import (
     OwnersEntry,
     add_correction,
     set_aside,
-    write_mission,
+    write_skills,
 )
 from mapspeak.skills.steps import parse_tree
 
@@ -162,9 +162,8 @@ class MissionTools:
             }
             book.desk.check(book.open_mission(OwnersEntry.model_validate(written)))
             path = book.folder / f"{name}.yaml"
-            write_mission(
-                path, {key: each for key, each in written.items() if each not in ("", [])}
-            )
+            told = {key: each for key, each in written.items() if each not in ("", [])}
+            write_skills(path, {"skills": [told]})
         return f"Saved {name} in {path}.\n{self._show(name)}"
 
     @tool("Show missions and skills", ToolEffect.READS)
