@@ -173,12 +173,11 @@ class MissionDesk:
         _check_given(spec, given, what=what)
         if step.output:
             names.add(step.output)
+        asked = frozenset({step.skill} if spec.is_always_asked else ())
         if isinstance(skill, Mission):
-            inner = self.check(skill, within)
-            return inner + MissionBounds(parts={spec.name: skill})
-        drives, asks = step.skill in DRIVING, spec.is_always_asked
-        is_free = (spec.effect is SkillEffect.READS or drives) and not asks
-        asked = frozenset({step.skill} if asks else ())
+            return self.check(skill, within) + MissionBounds(asked=asked, parts={spec.name: skill})
+        drives = step.skill in DRIVING
+        is_free = (spec.effect is SkillEffect.READS or drives) and not asked
         return MissionBounds(int(drives), 0 if is_free else 2, asked)
 
     def open(

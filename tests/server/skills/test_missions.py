@@ -309,6 +309,16 @@ async def test_keep_out_areas_hold_for_drives_of_missions(tmp_path: Path) -> Non
 QUEUE = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
 
 
+async def test_a_mission_that_a_person_is_always_asked_for_asks_within_another_one_too(
+    tmp_path: Path,
+) -> None:
+    careful = "skills:\n- {name: careful, approval: always, mission: [{wait: 1}]}\n"
+    guard = make_guard(tmp_path, Policy(approval=QUEUE))
+    async with missions(tmp_path, guard=guard, skills_file=careful) as caller:
+        await caller.refuse("run_mission", tree="- careful")
+        assert len(guard.approvals.room.list_waiting()) == 1
+
+
 async def test_one_approval_covers_a_mission_and_not_the_next_one(tmp_path: Path) -> None:
     guard = make_guard(tmp_path, Policy(approval=QUEUE))
     dock = FakeSkill(spec("dock", is_always_asked=True))
