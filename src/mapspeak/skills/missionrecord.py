@@ -6,7 +6,7 @@ import os
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -32,18 +32,19 @@ class Interrupted:
     steps: tuple[str, ...] = ()
 
 
+@dataclass(eq=False)
 class MissionRecord:
     """Writes one file, and finds in it the missions that an earlier server left unfinished.
 
-    Args:
+    Attributes:
         path: The file.
         wall_clock: The operator's; without one no times are written.
     """
 
-    def __init__(self, path: Path, *, wall_clock: Callable[[], datetime | None]) -> None:
-        self._path = path
-        self._wall_clock = wall_clock
-        self._run = ""
+    path: Path
+    _: KW_ONLY
+    wall_clock: Callable[[], datetime | None]
+    _run: str = ""
 
     def begin(self, name: str) -> None:
         """Note that a mission begins; the following steps are its own."""
@@ -71,7 +72,7 @@ class MissionRecord:
                 found.pop(run, None)
         if found:
             # The last line of a server that was killed may be half a line.
-            with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
+            with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
                 file.write("\n")
         for run in found:
             self._run = run
@@ -81,7 +82,7 @@ class MissionRecord:
     def _read(self) -> Iterator[dict[str, Any]]:
         lines: list[str] = []
         with suppress(OSError):
-            lines = self._path.read_text(encoding="utf-8").splitlines()
+            lines = self.path.read_text(encoding="utf-8").splitlines()
         for line in lines:
             with suppress(ValueError):
                 if isinstance(read := json.loads(line), dict):
@@ -89,7 +90,7 @@ class MissionRecord:
 
     def _write(self, event: str, said: str) -> None:
         """Append a line; that it cannot be is told, and ends no mission."""
-        at = self._wall_clock()
+        at = self.wall_clock()
         line = {
             "at": None if at is None else at.isoformat(timespec="seconds"),
             "run": self._run,
@@ -98,10 +99,10 @@ class MissionRecord:
             "said": said,
         }
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            if self._path.exists() and self._path.stat().st_size > MOST_BYTES:
-                self._path.replace(self._path.with_name(f"{self._path.name}.1"))
-            with self._path.open("a", encoding="utf-8") as file:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if self.path.exists() and self.path.stat().st_size > MOST_BYTES:
+                self.path.replace(self.path.with_name(f"{self.path.name}.1"))
+            with self.path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(line) + "\n")
         except OSError as error:
             logger.warning("What missions do could not be noted: %s", error.strerror)

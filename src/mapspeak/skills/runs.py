@@ -238,23 +238,21 @@ class SkillRun:
         news.set()
 
 
+@dataclass(eq=False)
 class SkillRuns:
     """All runs of one server, the latest last; they go on while `keep_going` runs.
 
-    Args:
+    Attributes:
         count_stops: Changes at each stop of the robot, which ends all runs but those that only
             read.
         questions: The questions that runs ask.
     """
 
-    def __init__(
-        self, count_stops: Callable[[], int] = lambda: 0, questions: QuestionBook | None = None
-    ) -> None:
-        self.questions = questions or QuestionBook()
-        self._count_stops = count_stops
-        self._runs: OrderedDict[str, SkillRun] = OrderedDict()
-        self._n_begun = 0
-        self._tasks: TaskGroup | None = None
+    count_stops: Callable[[], int] = lambda: 0
+    questions: QuestionBook = field(default_factory=QuestionBook)
+    _runs: OrderedDict[str, SkillRun] = field(default_factory=OrderedDict)
+    _n_begun: int = 0
+    _tasks: TaskGroup | None = None
 
     @property
     def under_way(self) -> list[SkillRun]:
@@ -277,7 +275,7 @@ class SkillRuns:
             await anyio.sleep(LOOK_S)
             for run in self.under_way:
                 does = run.skill.spec.effect is not SkillEffect.READS
-                if does and run.n_stops_before != self._count_stops():
+                if does and run.n_stops_before != self.count_stops():
                     run.give_up(SkillCode.STOPPED)
 
     async def begin(
@@ -301,7 +299,7 @@ class SkillRuns:
             handle=(handle := f"S{self._n_begun}"),
             skill=skill,
             client=None if isinstance(skill, Mission) else current_caller().session,
-            n_stops_before=self._count_stops(),
+            n_stops_before=self.count_stops(),
         )
         over = [each.handle for each in self._runs.values() if each.is_over]
         for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:

@@ -5,6 +5,7 @@ import logging
 import math
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
+from dataclasses import KW_ONLY, dataclass, field
 
 import anyio
 
@@ -32,10 +33,11 @@ PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
 logger = logging.getLogger(__name__)
 
 
+@dataclass(eq=False)
 class Exposure:
     """Keeps the board in step with the robot's interfaces of some names.
 
-    Args:
+    Attributes:
         ros: The way to the robot.
         board: Where the tools are put up.
         patterns: Of full names, as the shell writes them: "/gripper/*".
@@ -43,23 +45,15 @@ class Exposure:
         every_s: Between two looks.
     """
 
-    def __init__(
-        self,
-        ros: RosAccess,
-        board: SkillBoard,
-        patterns: tuple[str, ...],
-        *,
-        tell: Callable[[], Awaitable[None]],
-        every_s: float = EVERY_S,
-    ) -> None:
-        self._ros = ros
-        self._board = board
-        self._patterns = patterns
-        self._tell = tell
-        self._every_s = every_s
-        self._offered: dict[Interface, str] = {}
-        self._left_out: set[Interface] = set()
-        self._answers: dict[tuple[Called, str], tuple[list[Interface], float]] = {}
+    ros: RosAccess
+    board: SkillBoard
+    patterns: tuple[str, ...]
+    _: KW_ONLY
+    tell: Callable[[], Awaitable[None]]
+    every_s: float = EVERY_S
+    _offered: dict[Interface, str] = field(default_factory=dict)
+    _left_out: set[Interface] = field(default_factory=set)
+    _answers: dict[tuple[Called, str], tuple[list[Interface], float]] = field(default_factory=dict)
 
     async def keep_looking(self) -> None:
         """Look again and again; a robot out of reach keeps its tools until it is back.
@@ -68,10 +62,10 @@ class Exposure:
         """
         while True:
             with suppress(MapspeakError):
-                if self._ros.inquiry.connection.lost_for_s is not None:
+                if self.ros.inquiry.connection.lost_for_s is not None:
                     self.forget()
                 await self.look()
-            await anyio.sleep(self._every_s)
+            await anyio.sleep(self.every_s)
 
     def forget(self) -> None:
         """Ask for everything anew with the next look: the robot may be another one."""
@@ -84,32 +78,32 @@ class Exposure:
         Raises:
             LinkError: The robot cannot be asked.
         """
-        n_before = self._board.n_changes
+        n_before = self.board.n_changes
         found = await self._find()
         for gone in [each for each in self._offered if each not in found]:
-            self._board.take_down(self._offered.pop(gone))
+            self.board.take_down(self._offered.pop(gone))
         self._left_out &= set(found)
         for interface in found:
             if interface not in self._offered and interface not in self._left_out:
                 await self._offer(interface)
-        if self._board.n_changes != n_before:
-            await self._tell()
+        if self.board.n_changes != n_before:
+            await self.tell()
 
     async def _offer(self, interface: Interface) -> None:
         """Put up one interface; one that cannot be is told of once."""
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
-        name = name_tool(base, taken=self._board.taken_names)
+        name = name_tool(base, taken=self.board.taken_names)
         try:
             if len(self._offered) >= MOST_EXPOSED:
                 said = f"{MOST_EXPOSED} tools are exposed already."
                 raise LinkError(said, hint="Name fewer of them.")
             self._check_policy(interface)
-            skill = await open_interface(interface, self._ros, name=name, reserved=RESERVED)
+            skill = await open_interface(interface, self.ros, name=name, reserved=RESERVED)
         except MapspeakError as error:
             self._left_out.add(interface)
             logger.warning("%s is not exposed: %s", interface.name, error)
             return
-        self._board.put_up(skill)
+        self.board.put_up(skill)
         self._offered[interface] = name
 
     def _check_policy(self, interface: Interface) -> None:
@@ -118,7 +112,7 @@ class Exposure:
         Raises:
             PolicyError: It does: a tool that is always refused is not offered.
         """
-        connection, command = self._ros.inquiry.connection, interface.command
+        connection, command = self.ros.inquiry.connection, interface.command
         if command is None or not isinstance(connection, GuardedConnection):
             return
         if connection.is_name_denied(command):
@@ -126,12 +120,12 @@ class Exposure:
 
     async def _find(self) -> list[Interface]:
         """Return the requested interfaces that the robot offers now."""
-        connection = self._ros.inquiry.connection
+        connection = self.ros.inquiry.connection
         graph = await connection.fetch_graph()
         services = [
             name
             for name in await connection.fetch_services()
-            if name in self._patterns or not _is_everybodys(name)
+            if name in self.patterns or not _is_everybodys(name)
         ]
         types = {
             **{(Called.ACTION, name): "" for name in actions_of(graph)},
@@ -142,7 +136,7 @@ class Exposure:
         return [
             each
             for (called, name), kind in types.items()
-            if any(fnmatch.fnmatchcase(name, pattern) for pattern in self._patterns)
+            if any(fnmatch.fnmatchcase(name, pattern) for pattern in self.patterns)
             for each in await self._ask(called, name, kind)
         ]
 
@@ -162,7 +156,7 @@ class Exposure:
         Args:
             kind: The type of a topic, which the robot's graph tells.
         """
-        inquiry = self._ros.inquiry
+        inquiry = self.ros.inquiry
         match called:
             case Called.ACTION:
                 kind = await inquiry.fetch_action_type(name)

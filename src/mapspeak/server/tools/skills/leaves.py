@@ -1,6 +1,7 @@
 """A session as missions see it: the facts of their conditions, and the skills that all have."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import datetime
 
 from mapspeak.driving.drivereport import DriveReport
@@ -39,37 +40,37 @@ HEAR_S = 3.0
 KEPT_S = 2.0
 
 
+@dataclass(eq=False)
 class SessionFacts:
     """Facts of one session.
 
-    Args:
+    Attributes:
         session: The session to ask.
         ros: The ROS system that may publish a battery.
     """
 
-    def __init__(self, session: Session, ros: RosAccess) -> None:
-        self._session = session
-        self._ros = ros
-        self._battery: tuple[float | None, float] | None = None
+    session: Session
+    ros: RosAccess
+    _battery: tuple[float | None, float] | None = None
 
     @property
     def now_s(self) -> float:
         """Robot time."""
-        return self._session.robot.now_s
+        return self.session.robot.now_s
 
     async def sleep(self, duration_s: float) -> None:
         """Return when that much robot time has passed."""
-        await self._session.robot.sleep(duration_s)
+        await self.session.robot.sleep(duration_s)
 
     def read_calendar(self) -> datetime | None:
         """Return the operator's time; None where that is not known."""
-        return self._session.find_wall_time()
+        return self.session.find_wall_time()
 
     async def fetch_battery(self) -> float | None:
         """Return how full the battery is: as the robot itself tells, else a topic of its ROS."""
-        if self._session.skilled is not None:
-            return await self._session.skilled.fetch_battery()
-        if self._session.ros is None:
+        if self.session.skilled is not None:
+            return await self.session.skilled.fetch_battery()
+        if self.session.ros is None:
             return None
         # A simulation that is begun anew sets its clock back.
         if self._battery is None or not 0.0 <= self.now_s - self._battery[1] <= KEPT_S:
@@ -77,7 +78,7 @@ class SessionFacts:
         return self._battery[0]
 
     async def _hear_battery(self) -> float | None:
-        inquiry = self._ros.inquiry
+        inquiry = self.ros.inquiry
         try:
             topics = (await inquiry.fetch_topics()).types
             topic = next((name for name, kind in topics.items() if kind == BATTERY), None)
@@ -92,16 +93,16 @@ class SessionFacts:
 
     async def is_standing(self) -> bool:
         """Return True while no drive is under way."""
-        return not self._session.drives.is_busy
+        return not self.session.drives.is_busy
 
     async def is_in(self, room: str) -> bool | None:
         """Return True where the robot is in a room, by its id or its name."""
         here = await self._here()
         try:
-            world = await self._session.fetch_world_model()
+            world = await self.session.fetch_world_model()
         except (LinkError, MapError):
             return None
-        found = await self._session.compute(lambda: world.find_room_id(here))
+        found = await self.session.compute(lambda: world.find_room_id(here))
         if found == room.strip().upper():
             return True
         place = find_named(world, room)
@@ -112,8 +113,8 @@ class SessionFacts:
     async def is_near(self, place: str, within_m: float) -> bool | None:
         """Return True where the robot is so near to a place, in a straight line."""
         try:
-            world = await self._session.fetch_world_model()
-            point = await self._session.compute(lambda: find_place(world, place).point)
+            world = await self.session.fetch_world_model()
+            point = await self.session.compute(lambda: find_place(world, place).point)
         except (GoalError, LinkError, MapError):
             return None
         return (await self._here()).distance_to(point) <= within_m
@@ -123,7 +124,7 @@ class SessionFacts:
         now, wanted = self.read_calendar(), words.casefold().split()
         if now is None:
             return None
-        for event in self._session.recall_events():
+        for event in self.session.recall_events():
             begins, until = event.find_time(now)
             lasts = (begins is None or begins <= now) and (until is None or now < until)
             said = f"{event.text} {event.place}".casefold()
@@ -133,14 +134,14 @@ class SessionFacts:
 
     async def sees(self, label: str) -> bool | None:
         """Return True where the robot's detector reports such a thing now."""
-        if self._session.robot.description.detector is None:
+        if self.session.robot.description.detector is None:
             return None
         wanted = label.casefold()
-        found = await self._session.robot.fetch_detections()
+        found = await self.session.robot.fetch_detections()
         return any(wanted in each.label.casefold() for each in found)
 
     async def _here(self) -> Point:
-        return (await self._session.robot.fetch_pose()).pose.point
+        return (await self.session.robot.fetch_pose()).pose.point
 
 
 WAIT_S = 5.0
@@ -221,19 +222,19 @@ ENDS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
 class Leaves:
     """Does what missions do with the robot itself.
 
-    Args:
+    Attributes:
         session: Whose robot it is.
         facts: Of that session.
         questions: Where its questions wait.
     """
 
-    def __init__(self, session: Session, facts: Facts, questions: QuestionBook) -> None:
-        self._session = session
-        self._facts = facts
-        self._questions = questions
+    session: Session
+    facts: Facts
+    questions: QuestionBook
 
     def list_skills(self) -> Iterator[Skill]:
         """Yield each as a skill."""
@@ -247,7 +248,7 @@ class Leaves:
 
     async def _drive(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Drive as the tools do: checked, guarded, one drive at a time."""
-        session = self._session
+        session = self.session
         with session.drives.preparing() as ticket:
             yaw_deg = given.get("yaw_deg")
             goal = await session.find_goal(place=given["place"], x=None, y=None, yaw_deg=yaw_deg)
@@ -255,7 +256,7 @@ class Leaves:
 
     async def _look(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Drive to a clear view, and give the picture's id and what the detector reports in it."""
-        session, place, camera = self._session, given["place"], given.get("camera")
+        session, place, camera = self.session, given["place"], given.get("camera")
         if place.casefold() != AHEAD:
             if camera is not None:
                 raise GoalError(
@@ -273,7 +274,7 @@ class Leaves:
         sighting = await look_ahead(session, camera)
         taken = session.pictures.latest
         picture_id = "" if taken is None else taken.id
-        self._questions.keep(picture_id, sighting.picture)
+        self.questions.keep(picture_id, sighting.picture)
         seen = ", ".join(each.label for each in sighting.detections)
         return succeeded(picture=picture_id, seen=seen)
 
@@ -281,7 +282,7 @@ class Leaves:
         self, goal: Pose, title: str, ticket: int, on_progress: OnProgress
     ) -> SkillOutcome:
         """Drive to a checked goal; cancelled meanwhile, the robot is left standing."""
-        drives = self._session.drives
+        drives = self.session.drives
         drive = await drives.start(goal, place=title, ticket=ticket)
 
         async def tell(report: DriveReport) -> None:
@@ -301,7 +302,7 @@ class Leaves:
 
     async def _note(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Keep an observation with the time and the pose; `recall_episodes` finds it again."""
-        session, text = self._session, given["text"]
+        session, text = self.session, given["text"]
         pose = (await session.robot.fetch_pose()).pose
         room_id = await session.find_room_id(pose.point)
 
@@ -319,23 +320,23 @@ class Leaves:
         return failed(SkillCode.LOST, fault) if fault else succeeded(text=text, room=room_id or "")
 
     async def _check(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
-        return failed() if await find_unmet(given, self._facts) else succeeded()
+        return failed() if await find_unmet(given, self.facts) else succeeded()
 
     async def _wait_for(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
-        until_s = self._facts.now_s + given["within_s"]
-        while await find_unmet(given, self._facts):
-            if self._facts.now_s >= until_s:
+        until_s = self.facts.now_s + given["within_s"]
+        while await find_unmet(given, self.facts):
+            if self.facts.now_s >= until_s:
                 return failed()
-            await self._facts.sleep(CHECK_EVERY_S)
+            await self.facts.sleep(CHECK_EVERY_S)
         return succeeded()
 
     async def _wait(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
-        await self._facts.sleep(given["duration_s"])
+        await self.facts.sleep(given["duration_s"])
         return succeeded()
 
     async def _ask(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Ask, and fall back on the default where no answer comes in time."""
-        question = self._questions.put(
+        question = self.questions.put(
             given["question"],
             tuple(given.get("answers", ())),
             picture=given.get("picture"),
@@ -343,9 +344,9 @@ class Leaves:
         )
         on_progress(SkillProgress(is_asking=True))
         try:
-            await end_within(self._facts, given["within_s"], question.is_answered.wait)
+            await end_within(self.facts, given["within_s"], question.is_answered.wait)
         finally:
-            self._questions.waiting.remove(question)
+            self.questions.waiting.remove(question)
             on_progress(SkillProgress())
         if question.answer is not None:
             return succeeded(answer=question.answer, by="answered")
