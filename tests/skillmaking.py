@@ -17,6 +17,7 @@ from mapspeak.skill import (
     SkillSpec,
     SkillState,
 )
+from mapspeak.skills.guarding import is_as_wanted
 
 Doing = Callable[[Mapping[str, JsonValue]], Awaitable[SkillOutcome]]
 
@@ -89,23 +90,16 @@ class FakeFacts:
     def read_calendar(self) -> datetime | None:
         return self.calendar
 
-    async def fetch_battery(self) -> float | None:
-        return self.battery
-
-    async def is_standing(self) -> bool:
-        return self.stands
-
-    async def is_in(self, room: str) -> bool:
-        return room in self.rooms
-
-    async def is_near(self, place: str, within_m: float) -> bool:
-        return within_m > 0 and place in self.near
-
-    async def has_event(self, words: str) -> bool:
-        return words in self.events
-
-    async def sees(self, label: str) -> bool:
-        return label in self.seen
+    async def holds(self, name: str, wanted: Mapping[str, JsonValue]) -> bool | None:
+        value = wanted[name]
+        if name in ("battery_above", "battery_below"):
+            key = name.removeprefix("battery_")
+            return None if self.battery is None else is_as_wanted(self.battery, {key: value})
+        if name == "standing":
+            return self.stands is value
+        if name == "near":
+            return wanted.get("within_m", 1.0) > 0 and value in self.near
+        return value in {"in_room": self.rooms, "event": self.events, "sees": self.seen}[name]
 
 
 def tell_nobody(_progress: SkillProgress) -> None:

@@ -49,6 +49,7 @@ CONDITIONS = (
     SkillParameter("below", NUMBER, description="of the value"),
 )
 COMPARING = frozenset({"value", "is", "above", "below"})
+TIMES = frozenset({"time_from", "time_until"})
 MODIFIERS = frozenset({"not", "within_m", "within_s"})
 
 
@@ -65,23 +66,8 @@ class Facts(Protocol):
     def read_calendar(self) -> datetime | None:
         """Return the operator's time; None where that is not known."""
 
-    async def fetch_battery(self) -> float | None:
-        """Return how full the battery is, from 0 to 1; None where nothing tells it."""
-
-    async def is_standing(self) -> bool:
-        """Return True while no drive is under way."""
-
-    async def is_in(self, room: str) -> bool | None:
-        """Return True where the robot is in a room, by its id or its name."""
-
-    async def is_near(self, place: str, within_m: float) -> bool | None:
-        """Return True where the robot is so near to a place, in a straight line."""
-
-    async def has_event(self, words: str) -> bool | None:
-        """Return True while an event lasts in whose words these stand."""
-
-    async def sees(self, label: str) -> bool | None:
-        """Return True where the robot's detector reports such a thing now."""
+    async def holds(self, name: str, wanted: Arguments) -> bool | None:
+        """Return True where a condition of `OF_FACTS` holds now, other than those of the time."""
 
 
 async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
@@ -109,30 +95,13 @@ async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
 
 
 async def _holds(name: str, wanted: Arguments, facts: Facts) -> bool | None:
-    value = wanted[name]
-    holds: bool | None
-    match name:
-        case "battery_above" | "battery_below":
-            battery = await facts.fetch_battery()
-            key = name.removeprefix("battery_")
-            holds = None if battery is None else is_as_wanted(battery, {key: value})
-        case "standing":
-            holds = await facts.is_standing() is value
-        case "in_room":
-            holds = await facts.is_in(value)
-        case "near":
-            holds = await facts.is_near(value, wanted.get("within_m", 1.0))
-        case "event":
-            holds = await facts.has_event(value)
-        case "sees":
-            holds = await facts.sees(value)
-        case "time_from" | "time_until":
-            holds = _is_time(wanted, facts.read_calendar())
-        case _ if "value" not in wanted:
-            raise SkillError("is, above and below need a value.", hint="Write value: '{name}'.")
-        case _:
-            holds = is_as_wanted(wanted["value"], wanted)
-    return holds
+    if name in TIMES:
+        return _is_time(wanted, facts.read_calendar())
+    if name not in COMPARING:
+        return await facts.holds(name, wanted)
+    if "value" not in wanted:
+        raise SkillError("is, above and below need a value.", hint="Write value: '{name}'.")
+    return is_as_wanted(wanted["value"], wanted)
 
 
 def is_as_wanted(value: JsonValue, wanted: Mapping[str, JsonValue]) -> bool:

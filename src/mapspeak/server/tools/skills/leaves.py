@@ -32,7 +32,7 @@ from mapspeak.skill import (
     failed,
     succeeded,
 )
-from mapspeak.skills.guarding import CONDITIONS, Facts, end_within, find_unmet
+from mapspeak.skills.guarding import CONDITIONS, Facts, end_within, find_unmet, is_as_wanted
 from mapspeak.skills.runs import QuestionBook
 
 BATTERY = "sensor_msgs/BatteryState"
@@ -66,7 +66,27 @@ class SessionFacts:
         """Return the operator's time; None where that is not known."""
         return self.session.find_wall_time()
 
-    async def fetch_battery(self) -> float | None:
+    async def holds(self, name: str, wanted: Arguments) -> bool | None:
+        """Return True where a condition on the robot or its memory holds now."""
+        value = wanted[name]
+        found: bool | None
+        match name:
+            case "battery_above" | "battery_below":
+                key, battery = name.removeprefix("battery_"), await self._fetch_battery()
+                found = None if battery is None else is_as_wanted(battery, {key: value})
+            case "standing":
+                found = self.session.drives.is_busy is not value
+            case "in_room":
+                found = await self._is_in(value)
+            case "near":
+                found = await self._is_near(value, wanted.get("within_m", 1.0))
+            case "event":
+                found = self._has_event(value)
+            case _:
+                found = await self._sees(value)
+        return found
+
+    async def _fetch_battery(self) -> float | None:
         """Return how full the battery is: as the robot itself tells, else a topic of its ROS."""
         if self.session.skilled is not None:
             return await self.session.skilled.fetch_battery()
@@ -91,12 +111,7 @@ class SessionFacts:
         is_told = isinstance(share, int | float) and 0.0 <= share <= 1.0
         return float(share) if is_told and share is not None else None
 
-    async def is_standing(self) -> bool:
-        """Return True while no drive is under way."""
-        return not self.session.drives.is_busy
-
-    async def is_in(self, room: str) -> bool | None:
-        """Return True where the robot is in a room, by its id or its name."""
+    async def _is_in(self, room: str) -> bool | None:
         here = await self._here()
         try:
             world = await self.session.fetch_world_model()
@@ -110,7 +125,7 @@ class SessionFacts:
             return None
         return found is not None and world.find_room_id(place.point) == found
 
-    async def is_near(self, place: str, within_m: float) -> bool | None:
+    async def _is_near(self, place: str, within_m: float) -> bool | None:
         """Return True where the robot is so near to a place, in a straight line."""
         try:
             world = await self.session.fetch_world_model()
@@ -119,7 +134,7 @@ class SessionFacts:
             return None
         return (await self._here()).distance_to(point) <= within_m
 
-    async def has_event(self, words: str) -> bool | None:
+    def _has_event(self, words: str) -> bool | None:
         """Return True while an event lasts in whose words these stand."""
         now, wanted = self.read_calendar(), words.casefold().split()
         if now is None:
@@ -132,8 +147,7 @@ class SessionFacts:
                 return True
         return False
 
-    async def sees(self, label: str) -> bool | None:
-        """Return True where the robot's detector reports such a thing now."""
+    async def _sees(self, label: str) -> bool | None:
         if self.session.robot.description.detector is None:
             return None
         wanted = label.casefold()
