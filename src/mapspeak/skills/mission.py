@@ -31,6 +31,7 @@ from mapspeak.skill import (
 from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.skillsfile import OwnersEntry
 from mapspeak.skills.steps import Step, StepKind, find_names
 
 MOST_DRIVES = 1000
@@ -180,20 +181,20 @@ class MissionDesk:
         is_free = (spec.effect is SkillEffect.READS or drives) and not asked
         return MissionBounds(int(drives), 0 if is_free else 2, asked)
 
-    def open(
-        self,
-        spec: SkillSpec,
-        tree: Step,
-        *,
-        remember: tuple[str, ...] = (),
-        path: Path | None = None,
-    ) -> Mission:
-        """Return a tree as a skill."""
+    def open(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
+        """Return the mission that is written in an entry.
+
+        Args:
+            path: The file that it is saved in.
+
+        Raises:
+            SkillError: Its tree has a mistake.
+        """
 
         async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
             return await self._run(mission, arguments, on_progress)
 
-        mission = Mission(spec, run, tree, remember, path)
+        mission = Mission(entry.spec, run, entry.tree, tuple(entry.remember), path)
         return mission
 
     async def _run(

@@ -130,7 +130,7 @@ class SkillBook:
                 self._board.take_down(name)
         for name, (path, entry) in self._files.items():
             if before.get(name) != (path, entry):
-                self.saved[name] = self.open_mission(entry, path)
+                self.saved[name] = self.desk.open(entry, path)
                 self._offer(self.saved[name])
 
     def check_free(self, name: str) -> None:
@@ -147,19 +147,10 @@ class SkillBook:
     def _open(self, entry: OwnersEntry) -> Skill:
         """Return a skill of a file, held to the policy."""
         if entry.calls is Called.MISSION:
-            return self.open_mission(entry)
+            return self.desk.open(entry)
         run = partial(entry.run, partial(self._find_called, entry), self.find)
         is_ros = entry.calls is not Called.ROBOT_SKILL
         return self._gate.hold(Skill(entry.spec, run), is_through_guard=is_ros)
-
-    def open_mission(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
-        """Return the mission that is written in an entry.
-
-        Raises:
-            SkillError: Its tree has a mistake.
-        """
-        remember = tuple(entry.remember)
-        return self.desk.open(entry.spec, entry.tree, remember=remember, path=path)
 
     async def _find_called(self, entry: OwnersEntry) -> Skill:
         """Return the interface that a skill of skills.yaml calls, as the robot offers it now.
@@ -190,7 +181,7 @@ class SkillBook:
         """Return the fault of a skill of skills.yaml at this robot; empty without one."""
         try:
             if entry.calls is Called.MISSION:
-                self.desk.check(self.open_mission(entry))
+                self.desk.check(self.desk.open(entry))
                 return ""
             called = await self._find_called(entry)
         except MapspeakError as error:

@@ -102,7 +102,7 @@ class MissionTools:
             raise SkillError("A mission is either a tree or a name.", hint="Give one of them.")
         if name is None:
             written = {"name": "mission", "within_min": within_min, "mission": _read(tree)}
-            mission = self._book.open_mission(OwnersEntry.model_validate(written))
+            mission = self._book.desk.open(OwnersEntry.model_validate(written))
         else:
             mission = self._find_saved(name)
         given = read_values(mission.spec, values or [])
@@ -160,7 +160,7 @@ class MissionTools:
                 "mission": _read(tree),
                 "remember": [*kept, *([correction] if correction else [])],
             }
-            book.desk.check(book.open_mission(OwnersEntry.model_validate(written)))
+            book.desk.check(book.desk.open(OwnersEntry.model_validate(written)))
             path = book.folder / f"{name}.yaml"
             told = {key: each for key, each in written.items() if each not in ("", [])}
             write_skills(path, {"skills": [told]})
