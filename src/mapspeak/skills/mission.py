@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mapspeak.errors import SkillError
 from mapspeak.safety import (
@@ -20,19 +21,20 @@ from mapspeak.safety import (
 )
 from mapspeak.skill import (
     Arguments,
-    JsonValue,
     OnProgress,
     Skill,
     SkillEffect,
     SkillOutcome,
     SkillSpec,
-    SkillState,
 )
 from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
 from mapspeak.skills.skillsfile import OwnersEntry
 from mapspeak.skills.steps import Step, StepKind, find_names
+
+if TYPE_CHECKING:
+    from mapspeak.skills.missionrunner import MissionRunner
 
 MOST_DRIVES = 1000
 MOST_NESTED = 5
@@ -55,20 +57,6 @@ class Mission(Skill):
     tree: Step
     remember: tuple[str, ...] = ()
     path: Path | None = None
-
-
-@dataclass(slots=True)
-class MissionCourse:
-    """The course of one mission.
-
-    Attributes:
-        states: Of the leaves that have begun, by their numbers.
-    """
-
-    mission: Mission
-    given: Arguments
-    states: dict[int, SkillState] = field(default_factory=dict)
-    is_over: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +103,7 @@ class MissionDesk:
         record: On disk.
         present: Marks a client as present: a mission needs no client while it runs.
         begins: Called as a mission begins.
-        latest: The course of the latest mission; None before the first.
+        latest: The latest mission; None before the first.
     """
 
     find_skill: FindSkill
@@ -123,7 +111,7 @@ class MissionDesk:
     record: MissionRecord
     present: Callable[[], AbstractContextManager[None]] = nullcontext
     begins: Callable[[], None] = lambda: None
-    latest: MissionCourse | None = None
+    latest: "MissionRunner | None" = None
 
     def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
         """Return what a mission can do at most.
@@ -210,8 +198,8 @@ class MissionDesk:
         spec = mission.spec
         given = check_arguments(spec.parameters, arguments, skill=spec.name)
         if _PARTS.get() is not None:
-            part = partial(self._go, MissionCourse(mission, given), on_progress)
-            return await self.gate.run_once(spec, part, command=None)
+            part = self._build_runner(mission, given, on_progress)
+            return await self.gate.run_once(spec, part.run, command=None)
         if self.latest is not None and not self.latest.is_over:
             under_way = self.latest.mission.spec.name
             raise SkillError(
@@ -220,7 +208,7 @@ class MissionDesk:
             )
         bounds = self.check(mission)
         scope, guard = _scope_of(mission, given, bounds), self.gate.guard
-        self.latest = course = MissionCourse(mission, given)
+        self.latest = runner = self._build_runner(mission, given, on_progress)
         self.begins()
         token = _PARTS.set(bounds.parts)
         try:
@@ -228,39 +216,42 @@ class MissionDesk:
             with self.present(), within_scope(scope), calling(acting):
                 return await self.gate.run_once(
                     spec,
-                    partial(self._go_recorded, course, on_progress),
+                    partial(self._run_recorded, runner),
                     command=RunSkill(
                         skill=spec.name, arguments=given, needs_word=self._needs_word(spec, bounds)
                     ),
                     is_covering=False,
                 )
         finally:
-            course.is_over = True
+            runner.is_over = True
             _PARTS.reset(token)
             if guard is not None:
                 guard.end_scope(scope)
 
-    async def _go_recorded(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
+    async def _run_recorded(self, runner: "MissionRunner") -> SkillOutcome:
         said = "cut off"
-        self.record.begin(course.mission.spec.name)
+        self.record.begin(runner.mission.spec.name)
         try:
-            outcome = await self._go(course, on_progress)
+            outcome = await runner.run()
             said = str(outcome.state)
         finally:
             self.record.end(said)
         return outcome
 
-    async def _go(self, course: MissionCourse, on_progress: OnProgress) -> SkillOutcome:
+    def _build_runner(
+        self, mission: Mission, given: Arguments, on_progress: OnProgress
+    ) -> "MissionRunner":
         # Loads py_trees: a server that runs no mission does without.
         from mapspeak.skills.missionrunner import MissionRunner  # noqa: PLC0415
 
-        return await MissionRunner(
-            course=course,
+        return MissionRunner(
+            mission=mission,
+            given=given,
             find_skill=self._find_part,
             facts=self.gate.facts,
             on_progress=on_progress,
             on_step=self.record.note,
-        ).run()
+        )
 
     def _find_part(self, name: str) -> Skill:
         """Return a skill; a mission as it was approved, whatever its file says by now."""
@@ -311,7 +302,6 @@ def _scope_of(mission: Mission, given: Arguments, bounds: MissionBounds) -> Appr
 
 def _digest(mission: Mission, given: Arguments, parts: Mapping[str, Mission]) -> str:
     """Return what tells a mission from any other one, with the missions within it."""
-    within: dict[str, JsonValue] = {name: repr(each.tree) for name, each in parts.items()}
-    specs = [repr(each.spec) for each in (mission, *parts.values())]
-    exact = json.dumps([repr(mission.tree), given, within, specs], default=str, sort_keys=True)
+    written = [(each.spec, each.tree) for each in (mission, *parts.values())]
+    exact = repr(written) + json.dumps(given, default=str, sort_keys=True)
     return hashlib.sha256(exact.encode()).hexdigest()[:8]

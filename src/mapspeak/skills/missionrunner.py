@@ -15,6 +15,7 @@ from py_trees.decorators import FailureIsSuccess, Repeat, Retry
 
 from mapspeak.errors import MapspeakError
 from mapspeak.skill import (
+    Arguments,
     JsonValue,
     OnProgress,
     SkillCode,
@@ -24,7 +25,7 @@ from mapspeak.skill import (
     failed,
 )
 from mapspeak.skills.guarding import Facts, wait
-from mapspeak.skills.mission import FindSkill, MissionCourse
+from mapspeak.skills.mission import FindSkill, Mission
 from mapspeak.skills.steps import Step, StepKind, fill_in
 
 MOST_TOLD = 40
@@ -49,18 +50,23 @@ class MissionRunner:
     """Runs one mission once.
 
     Attributes:
-        course: With a tree that was checked before, and no step begun.
+        mission: With a tree that was checked before.
+        given: Its arguments.
         find_skill: Asked when a leaf begins: a skill may have gone meanwhile.
         facts: Tell the time.
         on_progress: Told of each step.
         on_step: Writes the record; it may not raise.
+        states: Of the leaves that have begun, by their numbers.
     """
 
-    course: MissionCourse
+    mission: Mission
+    given: Arguments
     find_skill: FindSkill
     facts: Facts
     on_progress: OnProgress
     on_step: OnStep
+    states: dict[int, SkillState] = field(default_factory=dict)
+    is_over: bool = False
     _account: list[str] = field(default_factory=list)
     _news: anyio.Event = field(default_factory=anyio.Event)
     _tasks: TaskGroup | None = None
@@ -71,8 +77,8 @@ class MissionRunner:
     def __post_init__(self) -> None:
         # py_trees prints its messages, and stdout belongs to the protocol.
         py_trees.logging.level = py_trees.logging.Level.ERROR
-        self._values: dict[str, JsonValue] = dict(self.course.given)
-        self._root = self._build(self.course.mission.tree)
+        self._values: dict[str, JsonValue] = dict(self.given)
+        self._root = self._build(self.mission.tree)
 
     async def run(self) -> SkillOutcome:
         """Run it to its end; cancelling this call cancels its running steps, too."""
@@ -86,7 +92,7 @@ class MissionRunner:
             self._tasks.cancel_scope.cancel()
         if self._cut_off is not None:
             return self._cut_off
-        given = (step.output for step in self.course.mission.tree.walk())
+        given = (step.output for step in self.mission.tree.walk())
         outputs = {name: self._values[name] for name in given if name in self._values}
         if self._root.status is Status.SUCCESS:
             return SkillOutcome(SkillState.SUCCEEDED, outputs=outputs)
@@ -124,19 +130,19 @@ class MissionRunner:
         self.wake()
 
     async def _do_leaf(self, step: Step) -> bool:
-        self.course.states[step.number] = SkillState.RUNNING
+        self.states[step.number] = SkillState.RUNNING
         try:
             skill = self.find_skill(step.skill)
             given = fill_in(step.name_arguments(skill.spec), self._values)
             self._tell(now=f"{step.number} {step.skill}")
             outcome = await skill.run(given, partial(self._take_progress, step))
         except anyio.get_cancelled_exc_class():
-            self.course.states[step.number] = SkillState.CANCELLED
+            self.states[step.number] = SkillState.CANCELLED
             self._note(f"{step.number} {step.skill}: cut off")
             raise
         except MapspeakError as error:
             outcome = failed(SkillCode.REJECTED, error.message)
-        self.course.states[step.number] = outcome.state
+        self.states[step.number] = outcome.state
         if step.output:
             self._values[step.output] = {**outcome.outputs, "ended": str(outcome.state)}
         self._note(_say_end(step, outcome))

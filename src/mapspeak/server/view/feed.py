@@ -219,11 +219,11 @@ class ViewFeed:
 
 
 def _describe_missions(book: SkillBook) -> MissionsView:
-    course = book.desk.latest
+    latest = book.desk.latest
     return MissionsView(
-        latest=None if course is None else draw_mission(course.mission),
-        is_over=course is None or course.is_over,
-        states={} if course is None else {n: str(each) for n, each in course.states.items()},
+        latest=None if latest is None else draw_mission(latest.mission),
+        is_over=latest is None or latest.is_over,
+        states={} if latest is None else {n: str(each) for n, each in latest.states.items()},
         questions=tuple(
             QuestionView(
                 id=each.id,
