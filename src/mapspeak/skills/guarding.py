@@ -51,6 +51,11 @@ CONDITIONS = (
 COMPARING = frozenset({"value", "is", "above", "below"})
 TIMES = frozenset({"time_from", "time_until"})
 MODIFIERS = frozenset({"not", "within_m", "within_s"})
+LOOK_S = 0.05
+"""Wall time between two looks at the robot's clock."""
+STILL_S = 1.0
+"""Wall time after which a clock that shows the same stands still."""
+T = TypeVar("T")
 
 
 class Facts(Protocol):
@@ -135,13 +140,6 @@ def _minutes(said: str) -> int:
     except ValueError as error:
         raise SkillError(f"{said!r} is no time of day.", hint="Write it as 22:00.") from error
     return at.hour * 60 + at.minute
-
-
-LOOK_S = 0.05
-"""Wall time between two looks at the robot's clock."""
-STILL_S = 1.0
-"""Wall time after which a clock that shows the same stands still."""
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)

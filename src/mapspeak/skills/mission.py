@@ -43,6 +43,7 @@ DRIVING = frozenset({"drive", "look"})
 """The skills that send the robot to a place."""
 MOST_TOLD = 160
 """Letters of the steps that a person is asked about; the tree has them all."""
+FindSkill = Callable[[str], Skill]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,9 +85,6 @@ class MissionBounds:
     def times(self, n: int) -> "MissionBounds":
         """Return the bounds of that many repetitions."""
         return MissionBounds(self.n_drives * n, self.n_commands * n, self.asked, self.parts)
-
-
-FindSkill = Callable[[str], Skill]
 
 
 # State of a task, not of the module: within a mission, the missions in it as they were approved.

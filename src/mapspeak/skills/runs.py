@@ -24,6 +24,13 @@ from mapspeak.skill import (
 from mapspeak.skills.mission import Mission
 
 MOST_PICTURES = 12
+MOST_KEPT = 200
+MOST_AT_ONCE = 20
+BEGINS_S = 2.0
+"""Wall time in which a run that cannot begin fails; before it no run is reported as going on."""
+LOOK_S = 0.05
+"""Wall time between two looks for a stop."""
+logger = logging.getLogger(__name__)
 
 
 @dataclass(eq=False)
@@ -125,15 +132,6 @@ class QuestionBook:
         question.is_answered.set()
         return question.answer
 
-
-MOST_KEPT = 200
-MOST_AT_ONCE = 20
-BEGINS_S = 2.0
-"""Wall time in which a run that cannot begin fails; before it no run is reported as going on."""
-LOOK_S = 0.05
-"""Wall time between two looks for a stop."""
-
-logger = logging.getLogger(__name__)
 
 OnNews = Callable[["SkillRun"], Awaitable[None]]
 

@@ -15,6 +15,12 @@ from mapspeak.skill import Arguments, JsonValue, SkillSpec
 from mapspeak.skills.arguments import plain
 
 TEMPLATE = re.compile(r"\{([a-z][a-z0-9_]*)(?:\.([A-Za-z0-9_]+))?\}")
+MOST_STEPS = 300
+DEEPEST = 16
+MOST_TIMES = 1000
+MOST_S = 86_400
+MOST_TEXT = 30_000
+MOST_NAME = 40
 
 
 class StepKind(StrEnum):
@@ -77,12 +83,6 @@ class Step:
         return {spec.parameters[0].name: self.main, **self.arguments}
 
 
-MOST_STEPS = 300
-DEEPEST = 16
-MOST_TIMES = 1000
-MOST_S = 86_400
-MOST_TEXT = 30_000
-MOST_NAME = 40
 CONTROL = frozenset(StepKind) - {StepKind.LEAF}
 OPTIONS: Mapping[StepKind, frozenset[str]] = {
     StepKind.SEQUENCE: frozenset(),

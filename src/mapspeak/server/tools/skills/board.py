@@ -41,6 +41,19 @@ Handle = Annotated[
     str | None, Field(description="such as S1; the latest when left out", max_length=40)
 ]
 OwnHandle = Annotated[str, Field(description="such as S1", max_length=40)]
+WAIT = SkillParameter(
+    "wait_s",
+    ParameterKind.NUMBER,
+    unit="s to wait for its end",
+    least=0.0,
+    most=LONGEST_WAIT_S,
+    default=10.0,
+)
+"""What the tool of a skill takes that may last longer than a call."""
+RESERVED = frozenset({"wait_s", "for_s", "robot"})
+"""Names that no argument of a skill may have: they are the tool's own."""
+MOST_NAME = 60
+MOST_TITLE = 60
 
 
 class SkillRunTools:
@@ -131,21 +144,6 @@ def _say_outcome(outcome: SkillOutcome) -> str:
         return said
     head = "result:" if outcome.state is SkillState.SUCCEEDED else "what it gave:"
     return "\n".join(filter(None, (said, f"{head}\n{show_message(outcome.outputs)}")))
-
-
-WAIT = SkillParameter(
-    "wait_s",
-    ParameterKind.NUMBER,
-    unit="s to wait for its end",
-    least=0.0,
-    most=LONGEST_WAIT_S,
-    default=10.0,
-)
-"""What the tool of a skill takes that may last longer than a call."""
-RESERVED = frozenset({"wait_s", "for_s", "robot"})
-"""Names that no argument of a skill may have: they are the tool's own."""
-MOST_NAME = 60
-MOST_TITLE = 60
 
 
 def name_tool(name: str, *, taken: Collection[str] = ()) -> str:

@@ -38,6 +38,21 @@ from mapspeak.skills.runs import QuestionBook
 BATTERY = "sensor_msgs/BatteryState"
 HEAR_S = 3.0
 KEPT_S = 2.0
+WAIT_S = 5.0
+CHECK_EVERY_S = 1.0
+HOUR_S, DAY_S = 3600.0, 86_400.0
+NUMBER, TEXT, LIST = ParameterKind.NUMBER, ParameterKind.TEXT, ParameterKind.LIST
+READS, MOVES = SkillEffect.READS, SkillEffect.MOVES
+WHERE = "an id, a remembered name, a phrase, or x, y"
+AHEAD = "ahead"
+ANSWER = SkillParameter("", TEXT, most=80)
+ENDS = {
+    GoalState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
+    GoalState.PREEMPTED: (SkillState.CANCELLED, SkillCode.STOPPED),
+    GoalState.REJECTED: (SkillState.FAILED, SkillCode.REJECTED),
+    GoalState.TIMED_OUT: (SkillState.FAILED, SkillCode.TOO_LATE),
+    GoalState.LOST: (SkillState.FAILED, SkillCode.LOST),
+}
 
 
 @dataclass(eq=False)
@@ -158,15 +173,6 @@ class SessionFacts:
         return (await self.session.robot.fetch_pose()).pose.point
 
 
-WAIT_S = 5.0
-CHECK_EVERY_S = 1.0
-HOUR_S, DAY_S = 3600.0, 86_400.0
-NUMBER, TEXT, LIST = ParameterKind.NUMBER, ParameterKind.TEXT, ParameterKind.LIST
-READS, MOVES = SkillEffect.READS, SkillEffect.MOVES
-WHERE = "an id, a remembered name, a phrase, or x, y"
-AHEAD = "ahead"
-
-
 def _spec(
     name: str, description: str, effect: SkillEffect, timeout_s: float, *parameters: SkillParameter
 ) -> SkillSpec:
@@ -211,7 +217,6 @@ WAIT = _spec(
     DAY_S + 60,
     SkillParameter("duration_s", NUMBER, unit="s", least=0, most=DAY_S, is_required=True),
 )
-ANSWER = SkillParameter("", TEXT, most=80)
 ASK = _spec(
     "ask",
     "Asks the model or the person who runs the mission, and waits for the answer",
@@ -227,13 +232,6 @@ ASK = _spec(
     _within(300.0),
     SkillParameter("picture", TEXT, description="its id; the latest if left out", most=40),
 )
-ENDS = {
-    GoalState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
-    GoalState.PREEMPTED: (SkillState.CANCELLED, SkillCode.STOPPED),
-    GoalState.REJECTED: (SkillState.FAILED, SkillCode.REJECTED),
-    GoalState.TIMED_OUT: (SkillState.FAILED, SkillCode.TOO_LATE),
-    GoalState.LOST: (SkillState.FAILED, SkillCode.LOST),
-}
 
 
 @dataclass(frozen=True, slots=True)
