@@ -252,8 +252,12 @@ class Session:
         # Ending the server does not wait for it.
         in_thread = partial(anyio.to_thread.run_sync, abandon_on_cancel=True)
         with suppress(MapspeakError):
-            await in_thread(lambda: self.recollector.warm(self.memory.read()))
-            world = await self.fetch_world_model()
+            try:
+                world = await self.fetch_world_model()
+            except MapspeakError:
+                # Without a map yet, all but the joining is made ready.
+                await in_thread(lambda: self.recollector.warm(self.memory.read()))
+                raise
             # All of it in the thread: what is remembered is joined with the map there.
             await in_thread(partial(_prepare, world))
             await in_thread(self.recollector.keep_things)

@@ -71,6 +71,18 @@ def test_a_later_session_takes_the_things_that_were_kept(tmp_path: Path) -> None
     assert (tmp_path / THINGS_FILE).stat().st_mtime_ns == written
 
 
+def test_what_was_made_of_kept_things_serves_the_next_question_too(tmp_path: Path) -> None:
+    _keep(tmp_path, _remember())
+    memory, grid, later = _remember(), _draw(), Recollector(kept=tmp_path)
+
+    made = later.recollect(memory, grid)
+
+    assert later.recollect(memory, grid) is made
+    assert all(
+        made.found.seen[place.name][0].of is place for place in memory.waypoints
+    ), "later questions compare records by identity"
+
+
 def test_what_changed_since_is_joined_anew(tmp_path: Path) -> None:
     _keep(tmp_path, _remember())
     changed = _remember(label="basin")

@@ -88,6 +88,7 @@ class Recollection:
     def __init__(
         self,
         memory: SemanticMap,
+        grid: OccupancyGrid,
         found: Things,
         *,
         places: Sequence[RememberedPlace],
@@ -97,6 +98,7 @@ class Recollection:
         search: Search,
     ) -> None:
         self.memory = memory
+        self.grid = grid
         self.found = found
         self.places = tuple(places)
         self.things = tuple(things)
@@ -106,7 +108,7 @@ class Recollection:
 
     def is_of(self, memory: SemanticMap, grid: OccupancyGrid) -> bool:
         """Return True when it was made of these records and this very map."""
-        return self.found.sight.grid is grid and self.memory.waypoints == memory.waypoints
+        return self.grid is grid and self.memory.waypoints == memory.waypoints
 
     @property
     def everything(self) -> tuple[Remembered, ...]:
@@ -296,6 +298,7 @@ class Recollector:
         )
         return Recollection(
             memory,
+            grid,
             found,
             places=number_places(memory.waypoints, () if earlier is None else earlier.places),
             things=things,

@@ -11,6 +11,7 @@ import re
 from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import chain, count
 
 import numpy as np
@@ -38,6 +39,7 @@ from mapspeak.memory.search.kinds import (
 )
 from mapspeak.memory.search.meaningindex import Floats, IntArray, MeaningIndex, TextVectors
 from mapspeak.memory.search.wordindex import (
+    MOST_KEPT,
     AskedWords,
     LookAlikes,
     WordIndex,
@@ -369,6 +371,7 @@ def _put_right(query: str, words: Iterable[AskedWords]) -> str:
     return query
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def _letters_of(request: str) -> str:
     """Return the stems of a request without what leads to it, in one: "night stand", too."""
     return "".join(content_stems(without_opening(request)))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -194,7 +194,12 @@ def read_waypoints(sight: SightMap, waypoints: Sequence[Waypoint], known: Seen) 
     for waypoint in waypoints:
         kept = known.get(waypoint.name, ())
         if len(kept) != 1 or kept[0].of is not waypoint:
-            kept = tuple(each for each in kept if each.of is waypoint or each.of == waypoint)
+            # The present one is held, so that the next time it is the very same.
+            kept = tuple(
+                each if each.of is waypoint else replace(each, of=waypoint)
+                for each in kept
+                if each.of is waypoint or each.of == waypoint
+            )
         read[waypoint.name] = read.get(waypoint.name, ()) + kept
         new += () if kept else ((waypoint, stand) for stand in waypoint.standpoints)
     near_m, far_m = look_around(sight, [stand.pose for _, stand in new])
