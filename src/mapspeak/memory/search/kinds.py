@@ -158,6 +158,8 @@ def _kinds_by_stems() -> MappingProxyType[tuple[str, ...], tuple[ThingKind, ...]
 _SAME_KIND_RATIO = 0.75
 """A label that names no kind belongs to the kind with a name at least this similar."""
 
+_AT_ONCE = 512
+
 _NAMING = frozenset(MatchField) - {MatchField.PURPOSE, MatchField.CATEGORY}
 """Parts of a record that name things that are there; its purpose may name others."""
 
@@ -258,14 +260,15 @@ class KindIndex:
             for label in labels
             if not (self._kinds_of[label] or is_carrier(label) or is_gone(label))
         )
-        if not unknown:
-            return
-        heads = [" ".join(find_head(label)) or label for label in unknown]
-        ratios = np.round(vectors.find(heads).astype(np.float64) @ of_names.T, 6)
-        for label, own in zip(unknown, ratios, strict=True):
-            number = int(own.argmax())
-            if own[number] >= _SAME_KIND_RATIO:
-                self._kinds_of[label] = (self._kinds[number],)
+        # A part at a time: the similarities of ten thousand labels fill hundreds of megabytes.
+        for start in range(0, len(unknown), _AT_ONCE):
+            some = unknown[start : start + _AT_ONCE]
+            heads = [" ".join(find_head(label)) or label for label in some]
+            ratios = np.round(vectors.find(heads).astype(np.float64) @ of_names.T, 6)
+            numbers = ratios.argmax(axis=1).tolist()
+            for label, number, ratio in zip(some, numbers, ratios.max(axis=1).tolist(), strict=True):
+                if ratio >= _SAME_KIND_RATIO:
+                    self._kinds_of[label] = (self._kinds[number],)
 
 
 def is_carrier(label: str) -> bool:

@@ -240,7 +240,7 @@ class _Column:
     def extend(self, rows: NDArray[Any]) -> None:
         n = self._n + len(rows)
         if n > len(self._room):
-            room = np.empty((n + n // 2, *self._room.shape[1:]), dtype=self._room.dtype)
+            room = np.empty((max(n, 3 * len(self._room) // 2), *self._room.shape[1:]), dtype=self._room.dtype)
             room[: self._n] = self.now
             self._room = room
         self._room[self._n : n] = rows
