@@ -78,9 +78,9 @@ def test_what_was_made_of_kept_things_serves_the_next_question_too(tmp_path: Pat
     made = later.recollect(memory, grid)
 
     assert later.recollect(memory, grid) is made
-    assert all(
-        made.found.seen[place.name][0].of is place for place in memory.waypoints
-    ), "later questions compare records by identity"
+    assert all(made.found.seen[place.name][0].of is place for place in memory.waypoints), (
+        "later questions compare records by identity"
+    )
 
 
 def test_what_changed_since_is_joined_anew(tmp_path: Path) -> None:

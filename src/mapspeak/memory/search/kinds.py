@@ -265,9 +265,9 @@ class KindIndex:
             some = unknown[start : start + _AT_ONCE]
             heads = [" ".join(find_head(label)) or label for label in some]
             ratios = np.round(vectors.find(heads).astype(np.float64) @ of_names.T, 6)
-            numbers = ratios.argmax(axis=1).tolist()
-            for label, number, ratio in zip(some, numbers, ratios.max(axis=1).tolist(), strict=True):
-                if ratio >= _SAME_KIND_RATIO:
+            for label, own in zip(some, ratios, strict=True):
+                number = int(own.argmax())
+                if own[number] >= _SAME_KIND_RATIO:
                     self._kinds_of[label] = (self._kinds[number],)
 
 

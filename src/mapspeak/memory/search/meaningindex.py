@@ -240,7 +240,8 @@ class _Column:
     def extend(self, rows: NDArray[Any]) -> None:
         n = self._n + len(rows)
         if n > len(self._room):
-            room = np.empty((max(n, 3 * len(self._room) // 2), *self._room.shape[1:]), dtype=self._room.dtype)
+            n_rows = max(n, 3 * len(self._room) // 2)
+            room = np.empty((n_rows, *self._room.shape[1:]), dtype=self._room.dtype)
             room[: self._n] = self.now
             self._room = room
         self._room[self._n : n] = rows
