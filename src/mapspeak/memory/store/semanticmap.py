@@ -4,7 +4,6 @@ Reading and writing are synchronous and safe between processes and threads: a st
 but what it read last.
 """
 
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -49,7 +48,6 @@ class SemanticMapStore(MemoryStore):
         super().__init__(path=path, walls=WallFolder(path), map_id=map_id)
         self._file = DurableFile(path, lock_timeout_s=lock_timeout_s)
         self._seen: _Seen | None = None
-        self._reading = threading.Lock()
 
     def read(self) -> SemanticMap:
         """Return all remembered places; look into the file only where it changed.
@@ -103,11 +101,7 @@ class SemanticMapStore(MemoryStore):
         return seen.document
 
     def _look(self) -> _Seen:
-        """Return what the file says now, reading only what changed, and that in one thread."""
-        with self._reading:
-            return self._look_alone()
-
-    def _look_alone(self) -> _Seen:
+        """Return what the file says now, reading only what changed."""
         seen = self._seen
         last = seen.document if seen else None
         try:
