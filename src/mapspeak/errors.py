@@ -10,6 +10,8 @@ MapspeakError           everything below; carries what is wrong and what to do n
 `- SemanticMapError     the semantic map file or a record in it is wrong
 """
 
+import difflib
+from collections.abc import Iterable
 from enum import StrEnum
 
 
@@ -38,6 +40,12 @@ class NextStep(StrEnum):
 def say_cause(error: Exception) -> str:
     """Return what is wrong in words, without the number and the path that an OSError puts there."""
     return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
+def say_nearest(name: str, known: Iterable[str]) -> str:
+    """Return a question with the known name that is most like another; empty if none is."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"Did you mean {near[0]}? " if near else ""
 
 
 class MapspeakError(Exception):

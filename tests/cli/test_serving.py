@@ -304,6 +304,25 @@ async def test_the_robots_map_is_written_when_a_signal_ends_the_server(
     assert read_state_log(log)
 
 
+@pytest.mark.anyio
+async def test_a_client_that_ends_before_its_answer_is_no_fault(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"]
+    reading, writing = os.pipe()
+    with anyio.fail_after(PATIENCE_S):
+        async with await anyio.open_process(
+            command, stdout=writing, env=environment(tmp_path)
+        ) as process:
+            os.close(writing)
+            os.close(reading)
+            assert process.stdin is not None
+            assert process.stderr is not None
+            await process.stdin.send(initialize_line())
+            said = b"".join([part async for part in process.stderr])
+            await process.wait()
+    assert not said
+    assert process.returncode == 0
+
+
 def initialize_line() -> bytes:
     """Gives what a client says first over stdio."""
     client = {"name": "test", "version": "0"}

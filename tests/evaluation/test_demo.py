@@ -1,4 +1,6 @@
 import json
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -104,3 +106,20 @@ def test_a_world_that_is_not_there_is_told_before_anything_runs(tmp_path: Path) 
 def test_a_text_without_a_pose_is_no_map_text() -> None:
     with pytest.raises(Exception, match="names no robot pose"):
         read_map_text("## Rooms\nid | kind\nR1 | room")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_early_signal_stops_it_with_one_line(tmp_path: Path, number: signal.Signals) -> None:
+    world = tmp_path / "flat.yaml"
+    os.mkfifo(world)
+    command = [sys.executable, "-m", "mapspeak", "demo", "--world", str(world)]
+    with (
+        subprocess.Popen(  # noqa: S603 - our own program
+            [*command, "--out", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
+        ) as begun,
+        world.open("w"),  # once the demo reads it
+    ):
+        begun.send_signal(number)
+        _, said = begun.communicate(timeout=60)
+    assert said == "Stopped.\n"
+    assert begun.returncode == 130

@@ -1,15 +1,18 @@
 """All commands, and how errors are shown."""
 
+import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
+from types import FrameType
 from typing import Any
 
 import click
 
 from mapspeak import __version__
-from mapspeak.cli.shared.options import keep_private
-from mapspeak.errors import MapspeakError
+from mapspeak.cli.shared.options import INTERRUPTED, keep_private
+from mapspeak.errors import MapspeakError, say_nearest
 
 COMMANDS: Mapping[str, tuple[str, str]] = {
     "approve": ("operating:approve", "agree to a command that waits for a person's word"),
@@ -68,6 +71,23 @@ class CommandGroup(click.Group):
         command: click.Command = getattr(import_module(f"mapspeak.cli.{module}"), name)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that is named first; suggest names where there is none of it."""
+        name = args[0]
+        if name not in self._table and (near := say_nearest(name, self._table)):
+            raise click.UsageError(f"No such command {name!r}. {near}".rstrip(), ctx)
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as in click
+        """Run the command; say in a line that Ctrl-C has stopped it."""
+        try:
+            return super().invoke(ctx)
+        except (KeyboardInterrupt, click.Abort):
+            click.echo("Stopped.", err=True)
+            ctx.exit(INTERRUPTED)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as in click
         """Write what each command does, without importing it."""
         with formatter.section("Commands"):
@@ -102,7 +122,7 @@ def main() -> None:
     """Run the command line; print a `MapspeakError` in one line, without a trace."""
     errors: list[MapspeakError] = []
     try:
-        with keep_private():
+        with keep_private(), _interrupted_by_sigterm():
             cli()
     except* MapspeakError as group:
         errors = _leaves(group)
@@ -110,6 +130,22 @@ def main() -> None:
         click.echo(f"mapspeak: {error}", err=True)
     if errors:  # not in the clause above, where Python 3.11.2 wraps the exit into a group
         sys.exit(2)
+
+
+@contextmanager
+def _interrupted_by_sigterm() -> Generator[None]:
+    """Let SIGTERM end what goes on as Ctrl-C does, with nothing left running or out of order."""
+
+    def interrupt(_number: int, frame: FrameType | None) -> None:
+        handler = signal.getsignal(signal.SIGINT)
+        # A shell's background jobs ignore SIGINT.
+        (handler if callable(handler) else signal.default_int_handler)(signal.SIGINT, frame)
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _leaves(group: BaseExceptionGroup[MapspeakError]) -> list[MapspeakError]:

@@ -1,14 +1,12 @@
 """`mapspeak eval`: tasks, agents and worlds, trial by trial, scored from the simulator's truth."""
 
-import signal
 import sys
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from mapspeak.cli.shared.options import INTERRUPTED
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -19,18 +17,6 @@ if TYPE_CHECKING:
 
 TABLE_WIDTH = 180
 """Width of the table in characters where the terminal's is unknown, as in a file."""
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it."""
-
-
-@contextmanager
-def interrupted_by_sigterm() -> Generator[None]:
-    """Let SIGTERM end what goes on as Ctrl-C does, with nothing left running or out of order."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
@@ -203,8 +189,7 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
             bar.note(result)
 
         try:
-            with interrupted_by_sigterm():
-                plan = run_evaluation(options, on_plan=on_plan, on_done=on_done)
+            plan = run_evaluation(options, on_plan=on_plan, on_done=on_done)
         except KeyboardInterrupt:
             bar.progress.stop()
             click.echo(f"Stopped: {bar.n_done} of {bar.n_asked} are done.", err=True)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
-from mapspeak.cli.evaluating import INTERRUPTED, interrupted_by_sigterm
 from mapspeak.cli.operating import StopKeys, Tell, stop_keys
 from mapspeak.cli.serving.viewing import MARKERS_OPTION, VIEW_OPTION
 from mapspeak.cli.shared.options import SEED_OPTION, WORLD_OPTION, usual_modes
@@ -149,14 +148,10 @@ def demo(
 
     folder = folder or Path("out") / f"demo-{Path(world).stem}-{seed}"
     console = Console(soft_wrap=True, highlight=False)
-    try:
-        with interrupted_by_sigterm(), TrialBar(is_quiet=is_quiet) as bar, usual_modes():
-            results = _run_trials(world, seed, folder, bar, view)
-            page = write_page(folder, results)
-            write_log(folder, results, {})
-    except KeyboardInterrupt:
-        click.echo("Stopped.", err=True)
-        sys.exit(INTERRUPTED)
+    with TrialBar(is_quiet=is_quiet) as bar, usual_modes():
+        results = _run_trials(world, seed, folder, bar, view)
+        page = write_page(folder, results)
+        write_log(folder, results, {})
     for result in results:
         console.print(say_result(result))
     click.echo(f"Everything can be replayed in {page}")

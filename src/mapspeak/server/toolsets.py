@@ -14,7 +14,7 @@ from mcp.server import MCPServer, NotificationOptions, ServerRequestContext
 from mcp.server.connection import Connection
 from mcp.server.subscriptions import ToolsListChanged
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_nearest
 from mapspeak.memory import LEFT_OUT
 from mapspeak.server.reports.representations import Representation
 from mapspeak.server.tools.drive import DriveTools, ViewTools
@@ -115,9 +115,10 @@ def choose_tools(
 def _check_names(what: str, asked: set[str], known: set[str]) -> None:
     strangers = sorted(asked - known)
     if strangers:
+        near = say_nearest(strangers[0], sorted(known))
         raise ConfigError(
             f"There is no {what} named {', '.join(map(repr, strangers))}.",
-            hint=f"Choose from {', '.join(sorted(known))}.",
+            hint=f"{near}Choose from {', '.join(sorted(known))}.",
         )
 
 

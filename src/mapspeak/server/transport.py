@@ -1,6 +1,8 @@
 """How a server reaches its clients: stdio, or streaming HTTP with its doors closed by default."""
 
 import logging
+import os
+import sys
 from collections.abc import AsyncIterable, Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
@@ -38,14 +40,25 @@ HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
     """Serve one client over standard input and output until it hangs up.
 
-    A line that is no message is answered, where the SDK keeps silent.
+    A line that is no message is answered, where the SDK keeps silent. A client that ends while an
+    answer is on its way has hung up too.
     """
     lowlevel = server._lowlevel_server  # noqa: SLF001 - what `run_stdio_async` runs
-    async with stdio_server() as (received, to_send), anyio.create_task_group() as tasks:
-        forward, messages = anyio.create_memory_object_stream[SessionMessage | Exception](0)
-        tasks.start_soon(_answer_unreadable, received, forward, to_send.send)
-        await lowlevel.run(messages, to_send, lowlevel.create_initialization_options())
-        tasks.cancel_scope.cancel()
+    try:
+        async with stdio_server() as (received, to_send), anyio.create_task_group() as tasks:
+            forward, messages = anyio.create_memory_object_stream[SessionMessage | Exception](0)
+            tasks.start_soon(_answer_unreadable, received, forward, to_send.send)
+            await lowlevel.run(messages, to_send, lowlevel.create_initialization_options())
+            tasks.cancel_scope.cancel()
+    except* BrokenPipeError:
+        _drop_output()
+
+
+def _drop_output() -> None:
+    """Send what is still to be written nowhere, or the interpreter complains when it ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
 async def _answer_unreadable(

@@ -1,13 +1,12 @@
 """The arguments of a skill: checked against its parameters, and as the JSON schema of a tool."""
 
-import difflib
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from mapspeak.errors import SkillError
+from mapspeak.errors import SkillError, say_nearest
 from mapspeak.memory.quoting import quote
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillParameter
 
@@ -53,9 +52,8 @@ def check_arguments(
     """
     known = {each.name: each for each in parameters}
     if stranger := next((str(name) for name in arguments if name not in known), None):
-        near = difflib.get_close_matches(stranger, known, n=1)
         takes = f"It takes {', '.join(known)}." if known else "It takes none."
-        hint = f"Did you mean {near[0]}? {takes}" if near else takes
+        hint = f"{say_nearest(stranger, known)}{takes}"
         raise SkillError(f"{skill} takes no {stranger[:MOST_SHOWN]!r}.", hint=hint)
     checked: dict[str, JsonValue] = {}
     for name, parameter in known.items():

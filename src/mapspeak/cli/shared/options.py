@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
 DEFAULT_WORLD = "warehouse"
 
 FILE = click.Path(path_type=Path)

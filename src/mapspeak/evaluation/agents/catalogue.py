@@ -5,7 +5,7 @@ from contextlib import suppress
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_nearest
 from mapspeak.evaluation.agent import Agent, ServerAccess, Work
 from mapspeak.evaluation.agents.baselines import (
     answer_at_random,
@@ -94,7 +94,7 @@ def find_agent(
         return Agent(name, partial(work_with_model, begin), ServerAccess.STDIO)
     raise ConfigError(
         f"There is no agent {name[:80]!r}.",
-        hint=f"There are: {', '.join(agent_names())}; "
+        hint=f"{say_nearest(name, agent_names())}There are: {', '.join(agent_names())}; "
         "PROVIDER/MODEL for a model, command:PROGRAM for a client program.",
     )
 

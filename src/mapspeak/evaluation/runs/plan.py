@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mapspeak import __version__
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_nearest
 from mapspeak.evaluation.agents.catalogue import (
     LESS_SIGHTED,
     can_think,
@@ -77,7 +77,8 @@ class RunOptions:
             if name not in set(Representation):
                 raise ConfigError(
                     f"There is no representation {name[:40]!r}.",
-                    hint=f"There are: {', '.join(Representation)}.",
+                    hint=f"{say_nearest(name, Representation)}There are: "
+                    f"{', '.join(Representation)}.",
                 )
 
     def load_worlds(self) -> dict[str, World]:

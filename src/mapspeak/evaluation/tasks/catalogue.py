@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_nearest
 from mapspeak.evaluation.scores.judging import judge_coverage
 from mapspeak.evaluation.tasks.errands import ERRAND_TASKS
 from mapspeak.evaluation.tasks.failures import FAILURE_TASKS
@@ -83,8 +83,9 @@ def find_task(name: str) -> Task:
         ConfigError: No task has that name.
     """
     if name not in _TASKS:
-        known = ", ".join((*FAMILIES, *_TASKS))
-        raise ConfigError(f"There is no task {name[:80]!r}.", hint=f"There are: {known}.")
+        known = (*FAMILIES, *_TASKS)
+        hint = f"{say_nearest(name, known)}There are: {', '.join(known)}."
+        raise ConfigError(f"There is no task {name[:80]!r}.", hint=hint)
     return _TASKS[name]
 
 

@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from mapspeak.errors import ConfigError, say_cause
+from mapspeak.errors import ConfigError, say_cause, say_nearest
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.worlds.models import kind_names
 from mapspeak.simulator.worlds.slices import slice_world
@@ -215,10 +215,11 @@ def _read_text(name_or_path: str | Path) -> tuple[str, str, str]:
     try:
         return str(path), path.stem, path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
+        names = world_names()
         raise ConfigError(
             f"There is no world {name!r}: it is no shipped world, and as a file it cannot be read"
             f" ({say_cause(error)}).",
-            hint=f"Name one of {', '.join(world_names())}, or give the path of a world file.",
+            hint=f"{say_nearest(name, names)}Name one of {', '.join(names)}, or a world file.",
         ) from error
 
 
@@ -293,11 +294,10 @@ def _check_names(section: str, names: Sequence[str]) -> None:
 
 
 def _check_kinds(objects: Sequence[_WrittenObject]) -> None:
+    kinds = sorted(kind_names())
     for index, thing in enumerate(objects):
-        if thing.kind not in kind_names():
-            near = difflib.get_close_matches(thing.kind, sorted(kind_names()), n=3) or sorted(
-                kind_names()
-            )
+        if thing.kind not in kinds:
+            near = difflib.get_close_matches(thing.kind, kinds, n=3) or kinds
             raise _FaultError(
                 ("objects", index, "kind"),
                 f"there is no kind {thing.kind!r}; perhaps one of {', '.join(near)}",

@@ -1,12 +1,11 @@
 """All skills of one server by their names: built in, the robot's own, its owner's, missions."""
 
-import difflib
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from mapspeak.errors import ConfigError, MapspeakError, SkillError
+from mapspeak.errors import ConfigError, MapspeakError, SkillError, say_nearest
 from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
@@ -84,8 +83,8 @@ class SkillBook:
         """
         found = self.skills.get(name)
         if found is None:
-            near = difflib.get_close_matches(name, self.skills, n=1)
-            hint = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(self.skills)}."
+            hint = say_nearest(name, self.skills).rstrip()
+            hint = hint or f"There are: {', '.join(self.skills)}."
             raise SkillError(f"There is no skill {name[:60]!r}.", hint=hint)
         return found
 
