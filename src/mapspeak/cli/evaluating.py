@@ -199,6 +199,6 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
     console = Console()
     if not console.is_terminal:
         console.width = TABLE_WIDTH
-    console.print(build_table(count_rows(results)))
+    console.print(build_table(count_rows(results), width=console.width))
     _write_report(options.folder, results, plan.versions)
     return 1 if bar.n_broken else 0

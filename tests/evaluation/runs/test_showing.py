@@ -5,7 +5,8 @@ import io
 from rich.console import Console
 
 from mapspeak.evaluation.runs.plan import RunPlan
-from mapspeak.evaluation.runs.showing import RunBar, TrialBar, say_result
+from mapspeak.evaluation.runs.showing import RunBar, TrialBar, build_table, say_result
+from mapspeak.evaluation.scores.rows import count_rows
 from mapspeak.evaluation.trials import Failure, ToolCall, TrialState, Turn
 from reportmaking import make_result, make_trial
 
@@ -13,12 +14,12 @@ COLUMNS = 78
 LONG = "a place with a name that is much longer than what is left of any line of a terminal"
 
 
-def draw(*parts: object, is_coloured: bool = False) -> str:
+def draw(*parts: object, is_coloured: bool = False, width: int = COLUMNS) -> str:
     """Draws what rich draws on a narrow terminal."""
     file = io.StringIO()
     console = Console(
         file=file,
-        width=COLUMNS,
+        width=width,
         force_terminal=is_coloured,
         color_system="standard" if is_coloured else None,
     )
@@ -63,3 +64,15 @@ def test_a_result_is_said_in_its_colour() -> None:
     assert "\x1b[1;31mBROKEN" in lines[2]
     plain = "done    Go to the smallest room: It stands in the toilet."
     assert draw(say_result(make_result(make_trial()))) == plain
+
+
+def test_a_table_for_a_narrow_terminal_cuts_no_word_and_says_what_it_leaves_out() -> None:
+    failed = make_result(make_trial(2), failure=Failure.WRONG_SIZE)
+    rows = count_rows([make_result(make_trial()), failed])
+    narrow, wide = (draw(build_table(rows, width=width), width=width) for width in (60, 180))
+    words = ("smallest-room", "1/2", "wrong_size 1", "scripted (script)", "picture-table")
+    assert not [word for word in words if word not in narrow or word not in wide]
+    assert "wall s" in wide
+    assert "Wider" not in wide
+    assert "driven m" in narrow.partition("show more:")[2]
+    assert max(map(len, narrow.splitlines())) <= 60

@@ -153,15 +153,38 @@ class TrialBar(_Bar):
             self.progress.update(self._bar, n_calls=self._n_calls, description=escape(said))
 
 
-def build_table(rows: Sequence[TableRow]) -> Table:
-    """Return the rows as a table for the terminal, without columns that say nothing."""
-    headings = ("task", "agent", "map shown as", "done", "95 %", *SHOWN.values())
-    columns = zip((*headings, "broken", "failures"), *map(_cells_of, rows), strict=True)
+def build_table(rows: Sequence[TableRow], *, width: int) -> Table:
+    """Return the rows as a table for the terminal, without columns that say nothing.
+
+    What all rows share stands above it. Figures that do not fit in the width are left out from
+    the last on, and named below it.
+
+    Args:
+        width: Of the terminal, in characters.
+    """
+    headings = ("task", "agent", "map shown as", "done", "95 %", "failures", "broken")
+    columns = list(zip((*headings, *SHOWN.values()), *map(_cells_of, rows), strict=True))
     kept = [column for column in columns if any(column[1:])]
-    table = Table(*(Column(heading, overflow="fold") for heading, *_ in kept))
-    for row in list(zip(*kept, strict=True))[1:]:
+    shared = [column for column in kept[1:3] if len(set(column[1:])) == 1]
+    kept = [column for column in kept if column not in shared]
+    n_first = sum(column[0] in headings for column in kept)
+    n_shown = len(kept)
+    while n_shown > n_first and _measure(kept[:n_shown]) > width:
+        n_shown -= 1
+    left_out = ", ".join(heading for heading, *_ in kept[n_shown:])
+    table = Table(
+        *(Column(heading, overflow="fold") for heading, *_ in kept[:n_shown]),
+        title=", ".join(f"{heading}: {cell}" for heading, cell, *_ in shared),
+        caption=f"Wider terminals and files show more: {left_out}." if left_out else None,
+    )
+    for row in list(zip(*kept[:n_shown], strict=True))[1:]:
         table.add_row(*row)
     return table
+
+
+def _measure(columns: Sequence[Sequence[str]]) -> int:
+    """Return the width of a table of columns, with a line and two spaces for each."""
+    return 1 + sum(3 + max(map(len, column)) for column in columns)
 
 
 def _cells_of(row: TableRow) -> tuple[str, ...]:
@@ -174,7 +197,7 @@ def _cells_of(row: TableRow) -> tuple[str, ...]:
         row.representation,
         f"{row.n_successes}/{row.n_trials}",
         span,
-        *("" if figure is None else f"{figure:.3g}" for figure in figures),
-        str(row.n_broken or ""),
         ", ".join(f"{failure} {count}" for failure, count in row.failures.items()),
+        str(row.n_broken or ""),
+        *("" if figure is None else f"{figure:.3g}" for figure in figures),
     )
