@@ -141,7 +141,7 @@ def check_blocked(
             is_cut or (metres is None) == (place.id in named),
         )
     for region in world.rooms.regions:
-        if region.id in named:
+        if region.id in named or is_cut:
             continue
         yield f"{region.id} has a way", _can_enter(told, world, region)
 
