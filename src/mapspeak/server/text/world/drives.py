@@ -172,12 +172,14 @@ EXPLORATION_STATES = {
 
 def say_progress(progress: Progress) -> str:
     """Say why a call of an exploration ended as it did, and why the known share fell if it did."""
-    told, known = progress.told_ratio, progress.known_ratio
-    if told is None or round(100 * known) >= round(100 * told):
+    if progress.told_ratio is None:
+        return _say_progress(progress)
+    told, known = (f"{100 * share:.1f} %" for share in (progress.told_ratio, progress.known_ratio))
+    if progress.known_ratio >= progress.told_ratio or known == told:
         return _say_progress(progress)
     return (
         f"{_say_progress(progress)} More floor can be expected than before, so that less of it "
-        f"is known: {100 * known:.0f} %, {100 * told:.0f} % before."
+        f"is known: {known}, {told} before."
     )
 
 
