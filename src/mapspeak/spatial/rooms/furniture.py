@@ -13,6 +13,7 @@ from mapspeak.spatial.rooms.raster import (
     Picture,
     Raster,
     Truths,
+    close_box,
     drop_small,
     drop_specks,
     find_boxes,
@@ -119,7 +120,8 @@ def _find_blocks(
     crumb = rest & (1 - fixed)
     block |= _find_touching(crumb & (1 - joined), block)
     block |= widen(block, cells.rim) & crumb
-    return block, wall & widen(block, cells.tip)
+    # Nothing sees what lies between two blocks, so that no bump begins there.
+    return block, wall & ((bump & widen(block, cells.tip)) | close_box(block, 2 * cells.tip + 1))
 
 
 def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
@@ -135,16 +137,17 @@ def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
 
 
 def _continue_walls(solid: Picture, bump: Picture, seen_wall: Picture, cells: _Sizes) -> Picture:
-    """Return 1 in bumps where walls that end at them run on in line."""
+    """Return 1 where walls that end at bumps run on in line, within them and between."""
     wall = np.zeros_like(solid)
     for axis in (0, 1):
         stub = _find_stubs(solid, bump, seen_wall, axis, cells)
-        lines = np.flatnonzero(stub.any(axis=axis) & bump.any(axis=axis))
+        is_beside = is_near(bump, cells.tip, 1 - axis).any(axis=axis)
+        lines = np.flatnonzero(stub.any(axis=axis) & is_beside)
         if lines.size:
             s, through = (np.take(part, lines, axis=1 - axis) > 0 for part in (stub, solid))
             here = (slice(None), lines) if axis == 0 else (lines, slice(None))
             wall[here] |= _run_on(s, through, axis, cells.long)
-    return wall & bump
+    return wall
 
 
 def _run_on(stub: Truths, through: Truths, axis: int, longest: int) -> Truths:

@@ -283,6 +283,12 @@ def open_box(picture: Picture, high: int, wide: int) -> Picture:
     )
 
 
+def close_box(picture: Picture, side: int) -> Picture:
+    """Return the set cells, and gaps between them that no square of this many cells fits into."""
+    box = np.ones((side, side), np.uint8)
+    return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_CLOSE, box), np.uint8)
+
+
 def widen(picture: Picture, cells: int) -> Picture:
     """Return the set cells, and those near them."""
     side = 2 * cells + 1
