@@ -1,6 +1,7 @@
 """Trees as models and people write them: read, checked, bounded, shown."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -55,11 +56,12 @@ def check(tree: str, *parameters: str, more: dict[str, Skill] | None = None) -> 
             raise SkillError(f"There is no skill {name!r}.", hint="Did you mean another?")
         return known[name]
 
-    gate, record = (
-        SkillGate(FakeFacts(), None),
-        MissionRecord(Path("unused"), wall_clock=lambda: None),
-    )
-    return MissionDesk(find, gate, record).check(mission(tree, *parameters))
+    return desk(find).check(mission(tree, *parameters))
+
+
+def desk(find: Callable[[str], Skill]) -> MissionDesk:
+    gate = SkillGate(FakeFacts(), None)
+    return MissionDesk(find, gate, MissionRecord(Path("unused"), wall_clock=lambda: None))
 
 
 def test_a_list_is_a_sequence_and_a_word_a_skill_that_is_given_nothing() -> None:
@@ -69,6 +71,16 @@ def test_a_list_is_a_sequence_and_a_word_a_skill_that_is_given_nothing() -> None
     assert (drive.skill, drive.main) == ("drive", "R3")
     assert (dock.skill, dock.main, dock.arguments) == ("dock", None, {})
     assert (speak.main, speak.arguments, speak.output) == ("hello", {"level": 2}, "said")
+
+
+def test_the_name_of_a_result_may_stand_before_its_step() -> None:
+    tree = read('{"as": "said", "speak": "hello", "level": 2}')
+    assert (tree.skill, tree.main, tree.arguments, tree.output) == (
+        "speak",
+        "hello",
+        {"level": 2},
+        "said",
+    )
 
 
 def test_json_is_read_as_well() -> None:
@@ -124,6 +136,7 @@ def test_aliases_that_multiply_are_counted_as_often_as_they_are_done() -> None:
         ("- speak", "needs words"),
         ("- drive: R1\n  to: '{x}'", "uses {x}"),
         ("- dock: now", "takes nothing"),
+        ("- drive: R1\n  place: R2", "is given place twice"),
         ("parallel:\n- drive: R1\n- drive: R2", "two places at once"),
         ("repeat: 600\ndo:\n- repeat: 2\n  do: {drive: R1}", "could drive 1,200 times"),
     ],
@@ -162,6 +175,22 @@ def test_a_mission_within_a_mission_counts_as_often_as_it_is_run() -> None:
     inner = mission("- drive: '{room}'\n- speak: hello", "room", name="inner")
     bounds = check("repeat: 5\ndo:\n- inner: R1", more={"inner": inner})
     assert (bounds.n_drives, bounds.n_commands) == (5, 10)
+
+
+def test_missions_of_many_missions_are_checked_once_each() -> None:
+    n_found = 0
+
+    def find(name: str) -> Skill:
+        nonlocal n_found
+        n_found += 1
+        return many[name] if name in many else SKILLS[name]
+
+    many = {
+        f"level{n}": mission(f"[{', '.join([inner] * 40)}]", name=f"level{n}")
+        for n, inner in enumerate(("check", "level0", "level1", "level2"))
+    }
+    assert desk(find).check(many["level3"]).n_drives == 0
+    assert n_found == 4 * 40
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,13 @@ class MapspeakServer(MCPServer[Any]):
 
     def expose(self, ros: RosAccess, patterns: tuple[str, ...]) -> None:
         """Look for interfaces of the robot with some names, once `keep_skills` runs."""
-        self.exposure = Exposure(ros, self.skills, patterns, tell=self.subscribers.tell)
+        self.exposure = Exposure(ros, self.skills, patterns, tell=self.tell_changes)
+
+    async def tell_changes(self) -> None:
+        """Tell clients that skills have become tools, have changed or are none any more."""
+        if self.skills.is_changed:
+            self.skills.is_changed = False
+            await self.subscribers.tell()
 
     async def keep_skills(self) -> None:
         """Let skills run, and look for those that the robot offers, until cancelled."""
@@ -196,7 +202,10 @@ class MapspeakServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         if name in self.skills.skills:
             return await self.skills.call(name, arguments, context)
-        return await super().call_tool(name, arguments, context)
+        try:
+            return await super().call_tool(name, arguments, context)
+        finally:
+            await self.tell_changes()
 
     def offer(self, tool: Tool) -> None:
         """Add a tool to those that can be called."""

@@ -87,6 +87,8 @@ class MissionBounds:
         return MissionBounds(self.n_drives * n, self.n_commands * n, self.asked, self.parts)
 
 
+KnownBounds = dict[tuple[str, int], MissionBounds]
+"""By the mission's name and the count of missions above it."""
 # State of a task, not of the module: within a mission, the missions in it as they were approved.
 _PARTS: ContextVar[Mapping[str, Mission] | None] = ContextVar("parts", default=None)
 
@@ -111,11 +113,15 @@ class MissionDesk:
     begins: Callable[[], None] = lambda: None
     latest: "MissionRunner | None" = None
 
-    def check(self, mission: Mission, above: tuple[str, ...] = ()) -> MissionBounds:
+    def check(
+        self, mission: Mission, above: tuple[str, ...] = (), known: KnownBounds | None = None
+    ) -> MissionBounds:
         """Return what a mission can do at most.
 
         Args:
             above: The missions that this one is within.
+            known: The bounds that are known by now: missions of many missions would take as long
+                as the product of their steps without them.
 
         Raises:
             SkillError: A part of it is unknown, not allowed, or does not fit.
@@ -124,20 +130,26 @@ class MissionDesk:
         if mission.spec.name in above or len(above) >= MOST_NESTED:
             way = " -> ".join(within)
             raise SkillError(f"The mission holds itself: {way}.", hint="Leave one step out.")
+        known, key = {} if known is None else known, (mission.spec.name, len(above))
+        if key in known:
+            return known[key]
         names = {each.name for each in mission.spec.parameters}
-        bounds = self._check(mission.tree, names, within)
+        bounds = self._check(mission.tree, names, within, known)
         if bounds.n_drives > MOST_DRIVES:
             raise SkillError(
                 f"The mission could drive {bounds.n_drives:,} times, the limit is {MOST_DRIVES:,}.",
                 hint="Repeat less often.",
             )
+        known[key] = bounds
         return bounds
 
-    def _check(self, step: Step, names: set[str], within: tuple[str, ...]) -> MissionBounds:
+    def _check(
+        self, step: Step, names: set[str], within: tuple[str, ...], known: KnownBounds
+    ) -> MissionBounds:
         """Check a step and the steps within; collect the names of its outputs."""
         if step.kind is StepKind.LEAF:
-            return self._check_leaf(step, names, within)
-        parts = [self._check(each, names, within) for each in step.steps]
+            return self._check_leaf(step, names, within, known)
+        parts = [self._check(each, names, within, known) for each in step.steps]
         if step.kind is StepKind.PARALLEL and sum(part.n_drives > 0 for part in parts) > 1:
             raise SkillError(
                 f"Step {step.number} drives to two places at once.",
@@ -145,7 +157,9 @@ class MissionDesk:
             )
         return sum(parts, MissionBounds()).times(step.times)
 
-    def _check_leaf(self, step: Step, names: set[str], within: tuple[str, ...]) -> MissionBounds:
+    def _check_leaf(
+        self, step: Step, names: set[str], within: tuple[str, ...], known: KnownBounds
+    ) -> MissionBounds:
         try:
             skill = self.find_skill(step.skill)
         except SkillError as error:
@@ -162,7 +176,8 @@ class MissionDesk:
             names.add(step.output)
         asked = frozenset({step.skill} if spec.is_always_asked else ())
         if isinstance(skill, Mission):
-            return self.check(skill, within) + MissionBounds(asked=asked, parts={spec.name: skill})
+            inner = self.check(skill, within, known)
+            return inner + MissionBounds(asked=asked, parts={spec.name: skill})
         drives = step.skill in DRIVING
         is_free = (spec.effect is SkillEffect.READS or drives) and not asked
         return MissionBounds(int(drives), 0 if is_free else 2, asked)

@@ -311,7 +311,7 @@ class SkillRuns:
                 await run.cancel()
             raise
         if run.error is not None:
-            del self._runs[handle]
+            self._runs.pop(handle, None)
             raise run.error
         return run
 

@@ -74,13 +74,16 @@ class Step:
         """Return a leaf's arguments by name.
 
         Raises:
-            SkillError: The skill takes none.
+            SkillError: The skill takes none, or is given one twice.
         """
         if self.main is None:
             return dict(self.arguments)
         if not spec.parameters:
             raise SkillError(f"{spec.name} takes nothing.", hint=f"Write only `{spec.name}`.")
-        return {spec.parameters[0].name: self.main, **self.arguments}
+        first = spec.parameters[0].name
+        if first in self.arguments:
+            raise SkillError(f"{spec.name} is given {first} twice.", hint="Leave one out.")
+        return {first: self.main, **self.arguments}
 
 
 CONTROL = frozenset(StepKind) - {StepKind.LEAF}
@@ -186,7 +189,8 @@ class _Reader:
 
 
 def _leaf(written: Mapping[str, Any], number: int) -> Step:
-    first, *others = written
+    # Some clients sort the names of JSON.
+    first, *others = sorted(written, key=lambda key: key == "as")
     given, output = _plain(written[first]), written.get("as", "")
     named = {str(key): _plain(written[key]) for key in others if key != "as"}
     if isinstance(given, Mapping):

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import anyio
 import pytest
+from mcp_types import ToolListChangedNotification
 
+from exposing import watched
+from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard, rectangle
 from mapspeak.errors import ConfigError
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
@@ -638,3 +641,40 @@ async def test_of_what_is_not_known_the_opposite_does_not_hold_either(
             for flag in ("true", "false")
         ]
     assert all("check: failed" in each for each in said)
+
+
+async def test_a_client_is_told_when_a_saved_mission_becomes_a_tool_and_is_none_again(
+    tmp_path: Path,
+) -> None:
+    n_told = 0
+
+    async def hear(message: object) -> None:
+        nonlocal n_told
+        n_told += isinstance(message, ToolListChangedNotification)
+
+    robot = FakeRobot(two_rooms())
+    async with watched(robot, None, tmp_path, expose=(), mode="legacy", on_message=hear) as caller:
+        assert "round" not in await caller.tools()
+        await caller.ask("save_mission", name="round", tree="- wait: 1")
+        await caller.ask("show_missions")
+        assert "round" in await caller.tools()
+        await caller.ask("forget_mission", name="round")
+        assert "round" not in await caller.tools()
+        await anyio.wait_all_tasks_blocked()
+    assert n_told == 2
+
+
+async def test_a_file_in_which_people_keep_several_missions_is_left_to_them(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "semantic_map.memory" / "missions"
+    folder.mkdir(parents=True)
+    several = folder / "rest.yaml"
+    written = "skills:\n- {name: rest, mission: [wait: 1]}\n- {name: nap, mission: [wait: 2]}\n"
+    several.write_text(written)
+    async with missions(tmp_path) as caller:
+        forgotten = await caller.refuse("forget_mission", name="rest")
+        lost = await caller.refuse("save_mission", name="rest", tree="- wait: 3")
+        hidden = await caller.refuse("save_mission", name="nap", tree="- wait: 3")
+    assert several.read_text() == written
+    assert all(str(several) in told for told in (forgotten, lost, hidden))

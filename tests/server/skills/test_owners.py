@@ -68,6 +68,14 @@ def lab(dialect: Dialect, *, percentage: float) -> tuple[Any, list[Any], list[An
     return system, asked, poses
 
 
+async def test_a_call_may_last_as_long_as_the_owner_says(tmp_path: Path) -> None:
+    system, *_ = lab(Dialect.ROS2, percentage=0.8)
+    light = OwnersEntry(name="light", service="/lab/light", timeout_s=3600.0)
+    async with exposed(system, tmp_path, expose=(), skills=[light]) as caller:
+        called = await caller.server.book.open_called(light)
+    assert called.spec.timeout_s == 3600.0
+
+
 @both
 async def test_a_service_is_called_with_what_the_owner_allows(
     dialect: Dialect, tmp_path: Path

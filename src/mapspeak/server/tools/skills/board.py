@@ -165,13 +165,13 @@ class SkillBoard:
 
     Attributes:
         is_read_only: It takes only skills that read.
-        n_changes: Counts what was put up and taken down.
+        is_changed: Tools have come, changed or gone since clients were told.
     """
 
     def __init__(self, runs: SkillRuns, *, others: Callable[[], Collection[str]]) -> None:
         self.runs = runs
         self.is_read_only = False
-        self.n_changes = 0
+        self.is_changed = False
         self._others = others
         self._offered: dict[str, tuple[Skill, ListedTool]] = {}
 
@@ -210,13 +210,13 @@ class SkillBoard:
             input_schema=schema_of((*spec.parameters, *((WAIT,) if _is_long(skill) else ()))),
             annotations=ToolAnnotations(read_only_hint=True) if reads else acts,
         )
+        before = self._offered.get(spec.name)
         self._offered[spec.name] = (skill, tool)
-        self.n_changes += 1
+        self.is_changed |= before is None or before[1] != tool
 
     def take_down(self, name: str) -> None:
         """Withdraw a skill; its runs go on."""
-        if self._offered.pop(name, None) is not None:
-            self.n_changes += 1
+        self.is_changed |= self._offered.pop(name, None) is not None
 
     async def call(
         self, name: str, arguments: Mapping[str, Any], context: Context[Any, Any] | None

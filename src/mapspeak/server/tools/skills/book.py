@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 from mapspeak.errors import ConfigError, MapspeakError, SkillError, say_nearest
 from mapspeak.memory.episodes.store import memory_folder
@@ -65,7 +64,6 @@ class SkillBook:
                     f"skills.yaml: {entry.name!r} is a word of missions.", hint="Rename the skill."
                 )
         self._owned = _by_name(self._open(each) for each in entries)
-        self._files: dict[str, tuple[Path, OwnersEntry]] = {}
         self.saved: dict[str, Mission] = {}
         self.load_saved()
 
@@ -102,6 +100,8 @@ class SkillBook:
                 raise ConfigError(f"skills.yaml: {error.message}", hint=error.hint) from error
         for skill in (*self._own.values(), *self.saved.values()):
             self._offer(skill)
+        # No client has seen others.
+        board.is_changed = False
 
     def _offer(self, skill: Skill) -> None:
         """Offer a skill as a tool once there is a board; one that is called as a tool is none."""
@@ -114,23 +114,21 @@ class SkillBook:
 
     def load_saved(self) -> None:
         """Read the saved missions anew; people may have edited the files."""
-        before, self._files = self._files, {}
+        before, self.saved = self.saved, {}
         for path in sorted(self.folder.glob("*.yaml")):
             try:
                 entries = load_skills(path)
             except ConfigError as error:
                 logger.warning("%s", error)
                 continue
-            missions = (each for each in entries if each.calls is Called.MISSION)
-            self._files |= {each.name: (path, each) for each in missions}
-        for name in before.keys() - self._files.keys():
-            del self.saved[name]
-            if self._board is not None:
+            for each in entries:
+                if each.calls is Called.MISSION:
+                    self.saved[each.name] = self.desk.open(each, path)
+        if self._board is not None:
+            for name in before.keys() - self.saved.keys():
                 self._board.take_down(name)
-        for name, (path, entry) in self._files.items():
-            if before.get(name) != (path, entry):
-                self.saved[name] = self.desk.open(entry, path)
-                self._offer(self.saved[name])
+        for mission in self.saved.values():
+            self._offer(mission)
 
     def check_free(self, name: str) -> None:
         """Return when a mission may be saved under a name.
@@ -147,11 +145,11 @@ class SkillBook:
         """Return a skill of a file, held to the policy."""
         if entry.calls is Called.MISSION:
             return self.desk.open(entry)
-        run = partial(entry.run, partial(self._find_called, entry), self.find)
+        run = partial(entry.run, partial(self.open_called, entry), self.find)
         is_ros = entry.calls is not Called.ROBOT_SKILL
         return self._gate.hold(Skill(entry.spec, run), is_through_guard=is_ros)
 
-    async def _find_called(self, entry: OwnersEntry) -> Skill:
+    async def open_called(self, entry: OwnersEntry) -> Skill:
         """Return the interface that a skill of skills.yaml calls, as the robot offers it now.
 
         Raises:
@@ -174,7 +172,8 @@ class SkillBook:
         if entry.definition and not await inquiry.connection.fetch_definitions(type_name):
             await inquiry.teach(type_name, entry.definition)
         interface = Interface(entry.calls, name, type_name)
-        return await open_interface(interface, self._ros, name=entry.name)
+        timeout_s = entry.timeout_s if "timeout_s" in entry.model_fields_set else None
+        return await open_interface(interface, self._ros, name=entry.name, timeout_s=timeout_s)
 
     async def check_entry(self, entry: OwnersEntry) -> str:
         """Return the fault of a skill of skills.yaml at this robot; empty without one."""
@@ -182,7 +181,7 @@ class SkillBook:
             if entry.calls is Called.MISSION:
                 self.desk.check(self.desk.open(entry))
                 return ""
-            called = await self._find_called(entry)
+            called = await self.open_called(entry)
         except MapspeakError as error:
             return str(error)
         takes = {each.name for each in called.spec.parameters}

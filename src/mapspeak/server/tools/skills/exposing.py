@@ -41,7 +41,7 @@ class Exposure:
         ros: The way to the robot.
         board: Where the tools are put up.
         patterns: Of full names, as the shell writes them: "/gripper/*".
-        tell: Called when tools have changed.
+        tell: Tells clients where tools have changed.
         every_s: Between two looks.
     """
 
@@ -78,7 +78,6 @@ class Exposure:
         Raises:
             LinkError: The robot cannot be asked.
         """
-        n_before = self.board.n_changes
         found = await self._find()
         for gone in [each for each in self._offered if each not in found]:
             self.board.take_down(self._offered.pop(gone))
@@ -86,8 +85,7 @@ class Exposure:
         for interface in found:
             if interface not in self._offered and interface not in self._left_out:
                 await self._offer(interface)
-        if self.board.n_changes != n_before:
-            await self.tell()
+        await self.tell()
 
     async def _offer(self, interface: Interface) -> None:
         """Put up one interface; one that cannot be is told of once."""

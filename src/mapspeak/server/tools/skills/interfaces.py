@@ -215,12 +215,18 @@ WAYS = {
 
 
 async def open_interface(
-    interface: Interface, ros: RosAccess, *, name: str, reserved: frozenset[str] = frozenset()
+    interface: Interface,
+    ros: RosAccess,
+    *,
+    name: str,
+    timeout_s: float | None = None,
+    reserved: frozenset[str] = frozenset(),
 ) -> Skill:
     """Return an interface as a skill.
 
     Args:
         name: Of the skill.
+        timeout_s: The limit of a call; a usual one where left out.
         reserved: Names that no argument may have.
 
     Raises:
@@ -234,7 +240,7 @@ async def open_interface(
         name,
         f"{way.does} {interface.name} ({interface.type})",
         SkillEffect.READS if reads else SkillEffect.MOVES,
-        timeout_s=way.timeout_s,
+        timeout_s=timeout_s or way.timeout_s,
         parameters=(*parameters, DURATION) if interface.is_velocity else parameters,
     )
     return Skill(spec, partial(way.run, _Opened(interface, ros, described, sent, spec)))

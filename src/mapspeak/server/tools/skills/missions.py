@@ -1,6 +1,7 @@
 """The tools of missions: run, answer, save, show, forget."""
 
 import re
+from pathlib import Path
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context, Image
@@ -161,7 +162,7 @@ class MissionTools:
                 "remember": [*kept, *([correction] if correction else [])],
             }
             book.desk.check(book.desk.open(OwnersEntry.model_validate(written)))
-            path = book.folder / f"{name}.yaml"
+            self._check_file(path := book.folder / f"{name}.yaml", name)
             told = {key: each for key, each in written.items() if each not in ("", [])}
             write_skills(path, {"skills": [told]})
         return f"Saved {name} in {path}.\n{self._show(name)}"
@@ -179,9 +180,22 @@ class MissionTools:
     async def forget_mission(self, name: Name) -> str:
         """Forget a saved mission; its file is kept beside as NAME.yaml.forgotten."""
         path = self._find_saved(name).path
-        aside = None if path is None else set_aside(path)
+        if path is not None:
+            self._check_file(path, name)
+            path = set_aside(path)
         self._book.load_saved()
-        return f"{name} is forgotten; its file is kept as {aside}."
+        return f"{name} is forgotten; its file is kept as {path}."
+
+    def _check_file(self, path: Path, name: str) -> None:
+        """Check that a file is all of one mission, and a mission in no other file.
+
+        Raises:
+            SkillError: It is not: the file is its writer's to change.
+        """
+        for each in self._book.saved.values():
+            if (each.path == path) != (each.spec.name == name):
+                said = f"{each.spec.name} stands in {each.path}, which a person has written."
+                raise SkillError(said, hint="Choose another name, or ask for a change of the file.")
 
     def _find_saved(self, name: str) -> Mission:
         self._book.load_saved()
