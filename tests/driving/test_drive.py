@@ -232,7 +232,7 @@ async def test_the_metres_driven_are_counted_also_while_nobody_waits() -> None:
     for _ in range(9):
         await robot.sleep(0.5)
         await drives.watch()
-    assert drives.driven_m == pytest.approx(4.5, abs=0.01)
+    assert drives.odometer.driven_m == pytest.approx(4.5, abs=0.01)
 
 
 async def test_a_drive_from_before_the_clock_was_set_back_has_no_negative_time() -> None:

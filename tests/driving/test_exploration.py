@@ -364,10 +364,12 @@ async def test_the_metres_of_an_exploration_are_those_of_its_own_drives(tmp_path
     with session.drives.preparing() as ticket:
         drive = await session.drives.start(Pose(0.0, 0.0), place="the start", ticket=ticket)
     await session.drives.wait(drive.goal_id, wait_s=60.0, on_progress=_tell_nobody)
-    driven_m = session.drives.driven_m
+    driven_m = session.drives.odometer.driven_m
     after = await _explore(explorer, Bounds(stops_at_goals=True))
     assert driven_m > before.driven_m
-    assert after.driven_m == pytest.approx(before.driven_m + session.drives.driven_m - driven_m)
+    assert after.driven_m == pytest.approx(
+        before.driven_m + session.drives.odometer.driven_m - driven_m
+    )
 
 
 async def test_every_drive_of_an_exploration_is_counted_once(tmp_path: Path) -> None:

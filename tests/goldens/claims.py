@@ -17,7 +17,9 @@ TITLE = re.compile(
     rf"(?: of (?P<reached>\d+) that can be reached)?(?: so far)?,? (?P<value>{NUMBER})?"
 )
 CODED = re.compile(r"\bshowing (\d+) (?:to (\d+) )?of (\d+)")
-PERCENT = re.compile(rf"^Explored: ({NUMBER}) of about ({NUMBER}) m2 of free floor, (\d+) %")
+PERCENT = re.compile(
+    rf"^Explored: ({NUMBER}) m2 of free floor, (\d+) %: frontiers promise about ({NUMBER}) m2"
+)
 
 
 def check_place(told: Statements, world: WorldModel, _text: str, report: Report) -> Iterator[Fact]:
@@ -215,8 +217,19 @@ def check_counts(
             yield f"{heading}: of {n_all}", int(found[3]) == n_all
     share = next(filter(None, map(PERCENT.match, text.splitlines())), None)
     if share:
-        percent = 100 * float(share[1]) / float(share[2])
-        yield f"{share[3]} % explored, not {percent:.1f}", abs(int(share[3]) - percent) <= 1.0
+        known_m2, promised_m2 = float(share[1]), float(share[3])
+        percent = 100 * known_m2 / (known_m2 + promised_m2)
+        yield f"{share[2]} % explored, not {percent:.1f}", abs(int(share[2]) - percent) <= 1.5
+        sum_m2 = sum(each.gain_m2 for each in world.frontiers.frontiers)
+        is_near = abs(promised_m2 - sum_m2) <= max(0.05 * sum_m2, 0.5)
+        yield f"{share[3]} m2 promised, not {sum_m2:.1f}", is_near
+    unnoted = re.search(r"^Rooms without a note: (.*)\.$", text, re.MULTILINE)
+    if unnoted or "Every room has a note." in text:
+        noted = {world.find_room_id(each.waypoint.pose.point) for each in world.places}
+        left = {each.id for each in _regions(world, "RO")} - noted
+        named = set(re.findall(r"\b[RO]\d+\b", unnoted[1])) if unnoted else set()
+        is_whole = named == left or (" more" in text and named < left)
+        yield f"no note of {sorted(left)}", is_whole
     reachable = re.search(r"^Of those with a way for the robot the smallest is (\w+) ", text)
     if reachable:
         yield (

@@ -12,7 +12,8 @@ from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
 from mapspeak.places.naming import AmbiguousPlaceError
-from mapspeak.places.recall.asking import RecallDoubt, RecallQuery, recall
+from mapspeak.places.recall.asking import RecallQuery, recall
+from mapspeak.places.recall.candidate import RecallDoubt
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector

@@ -336,6 +336,20 @@ async def test_a_bay_that_may_be_part_of_a_room_is_named_apart_from_the_smallest
     assert "Probably parts of others: R3 (3.3 m2, smaller than R2)." in text
 
 
+async def test_rooms_without_a_note_are_listed_from_the_first_note_on(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        before = text_of(await client.call_tool("look_at_map", {}))
+        for name, x in (("west", 1.5), ("east", 6.0)):
+            await client.call_tool(
+                "write_semantic_data", {"name": name, "description": "", "x": x, "y": 1.4}
+            )
+            text = text_of(await client.call_tool("look_at_map", {}))
+            if name == "west":
+                assert "Rooms without a note: R1." in text
+    assert "note" not in before
+    assert "Every room has a note." in text
+
+
 async def test_a_map_with_a_frontier_is_never_called_known_as_a_whole(tmp_path: Path) -> None:
     cells = np.full((302, 302), 100, np.int8)
     cells[1:-1, 1:-1], cells[150:155, -1] = 0, -1
@@ -343,11 +357,11 @@ async def test_a_map_with_a_frontier_is_never_called_known_as_a_whole(tmp_path: 
     robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.5), pose=Pose(125.0, 75.0))
     async with connect(robot, tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
-    ((known_m2, expected_m2, percent),) = re.findall(
-        r"Explored: ([\d.]+) of about (\d+) m2 of free floor, (\d+) %", text
+    ((known_m2, percent, promised_m2),) = re.findall(
+        r"Explored: ([\d.]+) m2 of free floor, (\d+) %: frontiers promise about (\d+) m2", text
     )
     assert "1 frontier" in text
-    assert float(expected_m2) > float(known_m2) > 0.995 * float(expected_m2)
+    assert 0 < float(promised_m2) < 0.005 * float(known_m2)
     assert percent == "99"
 
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 from mcp.client import Client
 
-from fakes import FakeRobot, two_rooms
+from fakes import SPEED_MPS, FakeRobot, two_rooms
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
 from served import connect, pictures_of, report_of, text_of
@@ -64,6 +64,35 @@ async def test_the_answer_tells_what_the_nearest_choice_would_have_cost(tmp_path
         )
     assert answer["done"] == ["extinguisher (T2)", "exit"]
     assert answer["greedy_m"] > answer["total_m"] + 1.0
+
+
+async def test_a_route_is_only_planned_where_asked_and_the_one_under_way_goes_on(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        first = {"stops": ["6, 1.4"], "wait_s": 1.0}
+        under_way = report_of(await client.call_tool("follow_route", first))
+        asked = {"stops": ["R1", "R2", "D1"], "order": "shortest", "drive": False}
+        plan = report_of(await client.call_tool("follow_route", asked))
+        assert len(robot.goals) == 1
+        last = report_of(await client.call_tool("follow_route", {"wait_s": 25.0}))
+        driven = report_of(await client.call_tool("follow_route", {**asked, "drive": True}))
+        again = report_of(await client.call_tool("follow_route", {**asked, "pause_s": 10.0}))
+    assert under_way["state"] == "driving"
+    assert (plan["state"], plan["done"], plan["total_s"]) == ("planned", [], None)
+    assert [plan["next"], *plan["remaining"]] != ["R1", "R2", "D1"]
+    assert plan["total_m"] == pytest.approx(sum(plan["legs_m"]), abs=0.2)
+    assert (last["state"], last["done"]) == ("done", ["(6.00, 1.40)"])
+    assert driven["state"] == "done"
+    assert again["total_s"] >= 30.0 + again["total_m"] / SPEED_MPS - 1.0
+
+
+async def test_a_plan_without_stops_is_refused(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        refused = await client.call_tool("follow_route", {"drive": False})
+    assert refused.is_error
+    assert "stops" in text_of(refused)
 
 
 async def test_a_look_at_each_stop_comes_with_a_picture_and_pauses_the_route(

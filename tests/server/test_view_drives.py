@@ -95,8 +95,11 @@ async def test_a_robot_that_maps_more_on_the_way_turns_to_it_on_arrival(tmp_path
         sent = await drive(client, place="R2", wait_s=0)
         robot.end_goal(GoalState.ARRIVED, pose=_backwards(sent))
         told = report_of(await client.call_tool("wait_for_goal", {}))
+        again = report_of(await client.call_tool("wait_for_goal", {}))
     assert told["state"] == "arrived"
     assert told["goal_id"] == sent["goal_id"]
+    assert [again[each] for each in ("goal_id", "place")] == [sent["goal_id"], sent["place"]]
+    assert (again["state"], again["goal"]) == ("arrived", None)
     assert math.degrees(robot.goals["fake-2"].yaw_rad) == pytest.approx(
         told["robot"]["yaw_deg"], abs=1
     )

@@ -38,6 +38,9 @@ class DriveBook:
     Args:
         when_busy: What becomes of a drive while one of another client is under way.
         patience_s: Robot time without any movement after which a drive has timed out.
+
+    Attributes:
+        odometer: How far and how fast the robot has come on its drives, by its own poses.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class DriveBook:
         self._robot = robot
         self._when_busy = when_busy
         self._monitor = DriveMonitor(robot, patience_s=patience_s, wall_s=wall_s)
+        self.odometer = self._monitor.odometer
         self._owed = OwedStop(robot, wall_s=wall_s)
         self._drives: dict[str, Drive] = {}
         self._n_started = 0
@@ -89,11 +93,6 @@ class DriveBook:
         """How often a stop was asked for here."""
         return self._n_stops
 
-    @property
-    def driven_m(self) -> float:
-        """How far the robot has come on its drives, by its own poses."""
-        return self._monitor.driven_m
-
     @contextmanager
     def preparing(self) -> Generator[int]:
         """Mark that a goal is being checked, and return the ticket to start its drive with."""
@@ -111,6 +110,7 @@ class DriveBook:
         place: str,
         ticket: int,
         purpose: GoalPurpose = GoalPurpose.ARRIVE,
+        part_of: Drive | None = None,
     ) -> Drive:
         """Send a goal to the robot, or let it wait its turn.
 
@@ -118,6 +118,7 @@ class DriveBook:
 
         Args:
             ticket: From `preparing`.
+            part_of: The drive that was asked for and that this one ends.
 
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
@@ -138,6 +139,7 @@ class DriveBook:
                 caller=current_caller(),
                 ticket=ticket,
                 purpose=purpose,
+                part_of=part_of,
             )
             is_other = busy is not None and busy.caller.owner != drive.caller.owner
             when_busy = self._when_busy if is_other else WhenBusy.REPLACE
@@ -174,8 +176,7 @@ class DriveBook:
 
     async def watch(self) -> None:
         """Look after the drive under way, and start the next one; to be called now and then."""
-        drive = self.under_way
-        if drive is not None:
+        if (drive := self.under_way) is not None:
             await self.report(drive.goal_id)
         await self._settle()
         await self._start_next()
@@ -282,8 +283,7 @@ class DriveBook:
 
     async def _find_busy(self) -> Drive | None:
         """Find the drive that is under way, after asking the robot whether it has ended."""
-        drive = self.under_way
-        if drive is not None:
+        if (drive := self.under_way) is not None:
             await self.report(drive.goal_id)
         return self.under_way
 

@@ -24,6 +24,7 @@ SILENT_FOR_S = 10.0
 """Wall time without state or pose after which a drive counts as lost."""
 STEP_M = 0.05
 """A pose that has moved less may only have wavered."""
+LEAST_PACED_M = 1.0
 STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
 WAITS = GoalStatus(state=GoalState.PLANNED, cause=Cause(code=CauseCode.WAITING))
 NEWS_S = 0.5
@@ -38,8 +39,27 @@ class Odometer:
 
     def __init__(self) -> None:
         self.driven_m = 0.0
+        self._begun_m = self._begun_s = 0.0
+        self._paced_m = self._paced_s = 0.0
         self._counted: Pose | None = None
         self._before: StampedPose | None = None
+
+    @property
+    def pace_mps(self) -> float | None:
+        """The mean speed of the drives that arrived, turns and waits included; None before one."""
+        return self._paced_m / self._paced_s if self._paced_s > 0 else None
+
+    def begin(self, now_s: float) -> None:
+        """Note when a drive sets out."""
+        self._begun_m, self._begun_s = self.driven_m, now_s
+
+    def arrive(self, now_s: float) -> None:
+        """Note when it has arrived; short drives are mostly turning and stopping."""
+        drive_m, drive_s = self.driven_m - self._begun_m, now_s - self._begun_s
+        if drive_m >= LEAST_PACED_M and drive_s > 0:
+            self._paced_m += drive_m
+            self._paced_s += drive_s
+        self.begin(now_s)
 
     def take(self, here: StampedPose) -> float | None:
         """Add the way since the pose before, and return how far that jumped; None if it did not.
@@ -92,7 +112,7 @@ class DriveMonitor:
         self._robot = robot
         self._patience_s = patience_s
         self._wall_s = wall_s
-        self._odometer = Odometer()
+        self.odometer = Odometer()
         self._seen = StampedPose(Pose(0.0, 0.0), 0.0)
         self._seen_s = 0.0
         self.begin()
@@ -102,13 +122,9 @@ class DriveMonitor:
         """Where the robot was seen last."""
         return self._seen.pose
 
-    @property
-    def driven_m(self) -> float:
-        """How far the robot has come, by its own poses."""
-        return self._odometer.driven_m
-
     def begin(self) -> None:
         """Begin to watch a drive that was just sent."""
+        self.odometer.begin(self._robot.now_s)
         self._moved_s = self._robot.now_s
         self._moved_at: Pose | None = None
         self._heard_s: float | None = None
@@ -122,7 +138,7 @@ class DriveMonitor:
             LinkError: The robot does not say where it is.
         """
         self._seen, self._seen_s = await self._robot.fetch_pose(), self._wall_s()
-        jump_m = self._odometer.take(self._seen)
+        jump_m = self.odometer.take(self._seen)
         # Kept until the drive under way is judged: this look may be for another.
         self._jump_m = self._jump_m if jump_m is None else jump_m
 
@@ -133,6 +149,8 @@ class DriveMonitor:
             status = await self._fetch_status(drive)
             doubt = PoseDoubt.NO_POSE
             await self.find_robot()
+            if drive.final is None and status.state is GoalState.ARRIVED:
+                self.odometer.arrive(self._robot.now_s)
             return Look(status=status)
         except LinkError as error:
             return Look(status=status, doubt=doubt, error=error)

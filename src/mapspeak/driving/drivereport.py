@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.relations.choosing import GoalPurpose
@@ -24,6 +24,7 @@ class Drive:
         caller: Who asked for it.
         ticket: What it was started with; a stop since then ends also what was to follow it.
         purpose: What the robot comes for.
+        part_of: The drive that was asked for and that this one ends; None for one of its own.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
         ended_s: Robot time when it was heard that the drive had ended; None while it goes on.
         ended_at: Where the robot was then; None where that is not known.
@@ -38,6 +39,7 @@ class Drive:
     caller: Caller = NOBODY
     ticket: int = 0
     purpose: GoalPurpose = GoalPurpose.ARRIVE
+    part_of: "Drive | None" = None
     begun_at: Point | None = None
     ended_s: float | None = None
     ended_at: Point | None = None
@@ -66,6 +68,16 @@ class DriveReport:
     silence: str
     is_stop_owed: bool
     elapsed_s: float
+
+    @property
+    def as_asked(self) -> "DriveReport":
+        """The same told of the drive that was asked for, where this one only ends it."""
+        asked, drive = self.drive.part_of, self.drive
+        if asked is None:
+            return self
+        told = replace(drive, goal_id=asked.goal_id, place=asked.place, purpose=asked.purpose)
+        before_s = drive.started_s - asked.started_s
+        return replace(self, drive=told, elapsed_s=self.elapsed_s + max(before_s, 0.0))
 
 
 SAME_GOAL_M = 0.5

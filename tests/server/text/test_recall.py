@@ -31,7 +31,7 @@ def ask(*places: Waypoint, words: str = "fire extinguisher") -> Recall:
 
 def list_answers() -> Iterator[tuple[Recall, str]]:
     yield ask(*LOOKS), 'Found: T1 "fire extinguisher". navigate_to takes T1.'
-    yield ask(LOOKS[0]), "no two good views of it agree so far. navigate_to takes T1. Look before"
+    yield ask(LOOKS[0]), "wall or furniture there. navigate_to takes T1. Look before"
     yield ask(UNPLACED), "not sure: where it is was not noted. navigate_to T1 goes where it was"
     yield ask(*LOOKS, words="a helicopter"), "Look for it with search_for."
     yield ask(), "Not remembered: nothing is remembered yet. Look for it with search_for."
@@ -44,6 +44,13 @@ def list_answers() -> Iterator[tuple[Recall, str]]:
 @pytest.mark.parametrize(("recalled", "said"), list(list_answers()))
 def test_advice_says_the_verdict_and_what_to_do_next(recalled: Recall, said: str) -> None:
     assert said in say_advice(recalled)
+
+
+def test_a_place_told_by_one_direction_alone_is_called_a_guess_with_its_radius() -> None:
+    one, several = ask(LOOKS[0]), ask(*LOOKS)
+    off_m = one.candidates[0].uncertainty_m
+    assert f"its place is a guess good to {off_m:.1f} m: of one direction" in say_advice(one)
+    assert [each.candidates[0].is_guessed for each in (one, several)] == [True, False]
 
 
 def test_the_nearest_of_several_is_told_with_how_well_its_place_is_known() -> None:

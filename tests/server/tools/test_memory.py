@@ -137,7 +137,8 @@ async def test_pictures_and_records_are_recalled_by_time_place_and_label(
     assert old.startswith("2 observations")
     assert ladder.startswith("1 observation;")
     assert '"a A quiet corner."' in quiet
-    assert "3 h ago" in quiet
+    assert "observation; showing 1. It is 15:00." in quiet
+    assert "record at 12:00 |" in quiet
     assert len(pictures_of(shown)) == 1
     assert strange.is_error
     assert "is no time" in text_of(wrong)
@@ -156,10 +157,13 @@ async def test_many_observations_are_summed_up_before_they_are_listed(tmp_path: 
         told = text_of(await client.call_tool("recall_episodes", {"since": "this afternoon"}))
         rest = text_of(await client.call_tool("recall_episodes", {"from_row": 20}))
         none = text_of(await client.call_tool("recall_episodes", {"since": "yesterday"}))
-    count, rooms, seen, *_ = told.splitlines()
+    count, rooms, seen, *rows = told.splitlines()
     assert count.startswith("24 observations; showing 20.")
     assert rooms == "By room: R2: 14 pictures, 12:00 to 12:13; R1: 10 pictures, 12:14 to 12:23."
-    assert seen == 'Seen last: "red ladder" 12:03, 21 min ago, in R2.'
+    assert seen == 'Seen last: "red ladder" 12:03 in R2.'
+    assert len(rows) == 2, "pictures of which nothing was noted share a line"
+    assert rows[0].count(" in R1;") == 10
+    assert "red ladder" in rest
     assert "By room" not in rest
     assert "Nothing observed passes" in none
 
@@ -176,8 +180,8 @@ async def test_what_was_seen_is_told_by_the_rooms_of_the_map_as_it_is_now(tmp_pa
         robot.grid = two_rooms()
         told = text_of(await client.call_tool("recall_episodes", {}))
         of_one = text_of(await client.call_tool("recall_episodes", {"room": "R2"}))
-    assert ", in R1 |" in told
-    assert ", in R2 |" in told
+    assert ", in R1\n" in told
+    assert told.endswith(", in R2") or ", in R2\n" in told
     assert of_one.startswith("1 observation;")
 
 
@@ -516,11 +520,11 @@ async def test_an_observation_tells_each_fact_once(tmp_path: Path) -> None:
     assert more.count(": picture at ") == 4
     for row in rows:
         assert re.fullmatch(
-            r"o\w+: picture at 12:00, 0 s ago \| from x [\d.]+, y 1\.00, yaw 0 deg, in R[12] \| "
-            r'saw "chair" \| picture [\w.-]+ \| \d\.\d m away',
+            r"o\w+: picture at 12:00 \| from x [\d.]+, y 1\.00, yaw 0 deg, in R[12] \| "
+            r'saw "chair" \| \d\.\d m away',
             row,
         )
-    assert chairs.splitlines()[1].endswith('| label "chair"')
+    assert chairs.splitlines()[-1].endswith('| label "chair"')
 
 
 @pytest.mark.parametrize("mode", MODES)

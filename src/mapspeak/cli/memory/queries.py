@@ -29,8 +29,8 @@ from mapspeak.memory.search.answer import EntryCandidate, Verdict, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import TextVectors, find_model
 from mapspeak.memory.things.finding import find_things
+from mapspeak.server.text.episodes import say_reasons
 from mapspeak.server.text.findings import say_finding
-from mapspeak.server.text.memory import say_reasons
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import find_rooms
 

@@ -176,6 +176,9 @@ def scope_of(place: str) -> ApprovalScope:
     return ApprovalScope(what=what, n_drives=MOST_DRIVES, duration_s=SCOPE_S)
 
 
+EXPLORING_LOOK = "a look while exploring,"
+
+
 async def turn_for_picture(site: PictureContext, *, on_progress: OnProgress) -> None:
     """Turn the robot where it stands to what no picture shows.
 
@@ -188,7 +191,9 @@ async def turn_for_picture(site: PictureContext, *, on_progress: OnProgress) -> 
     if pose == world.robot:
         return
     with suppress(GoalError, PolicyError):
-        await turn_to(site, pose.yaw_rad, wait_s=TURN_S, on_progress=on_progress)
+        await turn_to(
+            site, pose.yaw_rad, wait_s=TURN_S, on_progress=on_progress, what=EXPLORING_LOOK
+        )
 
 
 async def end_for_picture(
@@ -251,7 +256,7 @@ async def _turn_to_new_walls(
     pose = await site.compute(partial(_choose_face(drive), world, report.pose, views))
     if pose == report.pose:
         return report
-    turn = await site.drives.start(pose, place=name_turn(pose), ticket=drive.ticket)
+    turn = await site.drives.start(pose, place=name_turn(pose), ticket=drive.ticket, part_of=drive)
     turned = await site.drives.wait(turn.goal_id, wait_s=TURN_S, on_progress=on_progress)
     faced = replace(drive.goal, yaw_rad=pose.yaw_rad)
     return replace(

@@ -47,10 +47,21 @@ class TripContext(Protocol):
         ...
 
 
+TURN = "a turn"
+
+
 async def turn_to(
-    site: TripContext, yaw_rad: float, *, wait_s: float, on_progress: OnProgress
+    site: TripContext,
+    yaw_rad: float,
+    *,
+    wait_s: float,
+    on_progress: OnProgress,
+    what: str = TURN,
 ) -> DriveReport:
     """Turn the robot where it stands, and return how that went.
+
+    Args:
+        what: It is called so when it is asked about.
 
     Raises:
         GoalError: The robot was stopped meanwhile.
@@ -59,13 +70,13 @@ async def turn_to(
     with site.drives.preparing() as ticket:
         here = (await site.robot.fetch_pose()).pose
         goal = Pose(here.x, here.y, wrap_angle(yaw_rad))
-        drive = await site.drives.start(goal, place=name_turn(goal), ticket=ticket)
+        drive = await site.drives.start(goal, place=name_turn(goal, what), ticket=ticket)
     return await site.drives.wait(drive.goal_id, wait_s=wait_s, on_progress=on_progress)
 
 
-def name_turn(goal: Pose) -> str:
+def name_turn(goal: Pose, what: str = TURN) -> str:
     """Return what a drive is called that only turns the robot."""
-    return f"a turn to {goal.yaw_deg:.0f} deg"
+    return f"{what} to {goal.yaw_deg:.0f} deg"
 
 
 def spread_headings(first_rad: float, n_headings: int) -> list[float]:
@@ -134,7 +145,7 @@ class Trips:
         return self._ended_m + (0.0 if self.current is None else self._count_under_way())
 
     def _count_under_way(self) -> float:
-        return self._site.drives.driven_m - self._begun_at_m
+        return self._site.drives.odometer.driven_m - self._begun_at_m
 
     def _leave(self) -> Trip | None:
         """Count the metres of the trip under way, if there is one, and take it for ended."""
@@ -144,7 +155,7 @@ class Trips:
     def begin_count(self) -> None:
         """Count trips and metres from zero again; what was blocked stays remembered."""
         self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = self.n_ended = 0
-        self._ended_m, self._begun_at_m = 0.0, self._site.drives.driven_m
+        self._ended_m, self._begun_at_m = 0.0, self._site.drives.odometer.driven_m
 
     async def set_out(self, target: Target, *, ticket: int, grid: OccupancyGrid) -> TripState:
         """Send the robot to a target; one it was on the way to is given up.
@@ -160,7 +171,7 @@ class Trips:
         except GoalError as error:
             return self._take_in_refusal(target, error.message, ticket=ticket, grid=grid)
         self.n_seen += self._leave() is not None
-        self._begun_at_m = self._site.drives.driven_m
+        self._begun_at_m = self._site.drives.odometer.driven_m
         self.current = Trip(target, drive.goal_id)
         self.n_begun += 1
         return TripState.UNDER_WAY

@@ -33,6 +33,7 @@ class RouteState(StrEnum):
 
     DRIVING = "driving"
     AT_STOP = "at_stop"
+    PLANNED = "planned"
     BLOCKED = "blocked"
     INTERRUPTED = "interrupted"
     DONE = "done"
@@ -56,6 +57,8 @@ class RouteProgress:
         number: The stop that the robot stands at, or that the call ended for; counted from 0.
         is_pausing: The call ended while the robot stood at a stop as long as was asked for.
         ended: How the drive ended that something interrupted.
+        whole_s: Robot time for the whole route with its pauses, at the pace of the drives before;
+            None where that is unknown.
     """
 
     state: RouteState
@@ -66,6 +69,7 @@ class RouteProgress:
     number: int | None = None
     is_pausing: bool = False
     ended: GoalStatus | None = None
+    whole_s: float | None = None
 
 
 class RouteBook:
@@ -99,15 +103,42 @@ class RouteBook:
         Raises:
             GoalError: There is no such place, or no way there.
         """
-        world = await self._site.fetch_world_model()
-        plan = await self._site.compute(
-            lambda: plan_route(world, stops, order=order, end_at=end_at)
-        )
+        plan = await self._plan_route(stops, order, end_at)
         async with self._advancing:
             await self._give_up()
             self._plan = plan
             self._pause_s, self._is_looking, self._pause_until_s = pause_s, is_looking, None
         return plan
+
+    async def plan(
+        self, stops: Sequence[str], *, pause_s: float, order: RouteOrder, end_at: str | None
+    ) -> RouteProgress:
+        """Return a route as planned; the robot and the route it follows stay as they are.
+
+        Raises:
+            GoalError: There is no such place, or no way there.
+        """
+        plan = await self._plan_route(stops, order, end_at)
+        here = await self._site.robot.fetch_pose()
+        return RouteProgress(
+            state=RouteState.PLANNED,
+            plan=plan,
+            pose=here.pose,
+            pose_doubt=here.find_doubt(self._site.robot.now_s),
+            whole_s=self._estimate_s(plan, pause_s),
+        )
+
+    async def _plan_route(
+        self, stops: Sequence[str], order: RouteOrder, end_at: str | None
+    ) -> RoutePlan:
+        world = await self._site.fetch_world_model()
+        return await self._site.compute(
+            lambda: plan_route(world, stops, order=order, end_at=end_at)
+        )
+
+    def _estimate_s(self, plan: RoutePlan, pause_s: float) -> float | None:
+        pace_mps = self._site.drives.odometer.pace_mps
+        return None if pace_mps is None else plan.total_m / pace_mps + len(plan.stops) * pause_s
 
     async def advance(
         self, *, wait_s: float, when_blocked: WhenBlocked, on_progress: OnProgress
@@ -260,6 +291,7 @@ class RouteBook:
             number=number,
             is_pausing=is_pausing,
             ended=ended,
+            whole_s=self._estimate_s(self._plan, self._pause_s),
         )
 
 

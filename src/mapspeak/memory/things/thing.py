@@ -141,6 +141,12 @@ class Thing:
     last_seen: datetime | None = None
 
     @property
+    def is_guessed(self) -> bool:
+        """True where only one direction is known, and where the map ends it is taken to be."""
+        has_range = any(view.landmark.range_m is not None for view in self.supporting)
+        return self.position is not None and self.n_agreeing < 2 and not has_range
+
+    @property
     def waypoints(self) -> tuple[str, ...]:
         """The places it was seen from, each once."""
         return tuple(dict.fromkeys(view.waypoint for view in self.supporting))

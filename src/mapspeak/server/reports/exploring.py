@@ -50,6 +50,10 @@ DETOUR_M = 0.05
 ROUTE_NEXT_STEP = {
     RouteState.DRIVING: "Call {follow_route} without stops to go on. {stop_robot} ends it.",
     RouteState.AT_STOP: "Look, record what matters, then call {follow_route} without stops.",
+    RouteState.PLANNED: (
+        "Nothing was driven and no route was changed. Call {follow_route} with these stops, "
+        "without drive=false, to drive it."
+    ),
     RouteState.BLOCKED: (
         "Call {follow_route} without stops to try again, or with when_blocked=skip to leave it out."
     ),
@@ -215,6 +219,9 @@ class RouteAnswer(Report):
     left_m: float | None = Field(description="by path, to the next stop")
     legs_m: list[float] = Field(description="by path, as planned, from the robot on")
     total_m: float
+    total_s: float | None = Field(
+        description="pauses included, at its pace so far; null before it has driven"
+    )
     greedy_m: float | None = Field(
         description="the total if the nearest candidate were taken each time, where that is more"
     )
@@ -242,6 +249,7 @@ class RouteAnswer(Report):
             left_m=None if progress.left_m is None else round(progress.left_m, 1),
             legs_m=[round(stop.leg_m, 1) for stop in plan.stops],
             total_m=round(plan.total_m, 1),
+            total_s=None if progress.whole_s is None else float(round(progress.whole_s)),
             greedy_m=round(plan.greedy_m, 1) if _is_better(plan) else None,
             as_given_m=None if plan.as_given_m is None else round(plan.as_given_m, 1),
             robot=PoseReport.of(progress.pose),

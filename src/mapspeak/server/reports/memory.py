@@ -19,7 +19,8 @@ from mapspeak.memory.quoting import quote, quote_name
 from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
 from mapspeak.places.goalcheck import say_check
-from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallQuery
+from mapspeak.places.recall.asking import Recall, RecallQuery
+from mapspeak.places.recall.candidate import RecallCandidate
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
@@ -122,6 +123,7 @@ class CandidateReport(Report):
     seen_from: list[str] = Field(description="ids of remembered places")
     pictures: list[str]
     position: list[float] | None = Field(description="x, y in metres; null when not noted")
+    is_guessed: bool = Field(description="taken to be where its one known direction meets a wall")
     uncertainty_m: float | None = Field(description="radius that holds it with 90 %")
     room: str | None = Field(description="by id; several where unsure")
     path_m: float | None = Field(description="null when there is no way")
@@ -145,6 +147,7 @@ class CandidateReport(Report):
             seen_from=list(candidate.seen_from),
             pictures=list(candidate.pictures),
             position=None if at is None else [round(at.x, 2) + 0.0, round(at.y, 2) + 0.0],
+            is_guessed=candidate.is_guessed,
             uncertainty_m=None if off_m is None else round(off_m, 2),
             room=" or ".join(candidate.room_ids) or None,
             path_m=None if check.path_m is None else round(check.path_m, 2),
@@ -160,7 +163,9 @@ class CandidateReport(Report):
     def row(self) -> tuple[str, ...]:
         """A line of a table with the columns `COLUMNS`."""
         at, stand = self.position, self.stand_at
-        radius = "" if self.uncertainty_m is None else f" (within {self.uncertainty_m:.1f} m)"
+        guess = "a guess, " if self.is_guessed else ""
+        off_m = self.uncertainty_m
+        radius = "" if off_m is None else f" ({guess}within {off_m:.1f} m)"
         faced = ", facing it" if self.facing_it else ""
         return (
             self.id,

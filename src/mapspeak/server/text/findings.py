@@ -36,6 +36,14 @@ def _say_views(thing: Thing) -> str:
     return f"Seen from {len(thing.waypoints)}{views}: {names}."
 
 
+def say_guess(radius_m: float) -> str:
+    """Say how well a place is known that is told by one direction alone."""
+    return (
+        f"a guess good to {radius_m:.1f} m: of one direction and no range, put at the wall or "
+        "furniture there"
+    )
+
+
 def say_support(view: View) -> str:
     """Say why a view speaks for a thing."""
     if view.far_m is None or view.off_rad is None:

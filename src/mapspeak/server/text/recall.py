@@ -10,7 +10,9 @@ from mapspeak.memory.things.approach import LOOK_AGAIN_M
 from mapspeak.memory.things.thing import Thing
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
-from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
+from mapspeak.places.recall.asking import Recall
+from mapspeak.places.recall.candidate import RecallCandidate, RecallDoubt
+from mapspeak.server.text.findings import say_guess
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import list_some, say_count
 from mapspeak.worldmodel.model import WorldModel
@@ -133,6 +135,8 @@ def _say_look(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
 
 
 def _say_doubt(first: RecallCandidate, doubt: RecallDoubt) -> str:
+    if first.is_guessed and doubt in (RecallDoubt.FEW_VIEWS, RecallDoubt.IMPRECISE):
+        return f"its place is {say_guess(first.uncertainty_m or 0.0)}"
     rooms = " or ".join(first.room_ids) or "no room"
     return DOUBTS[doubt].format(off_m=first.uncertainty_m, rooms=rooms)
 
@@ -235,4 +239,6 @@ def say_placed(world: WorldModel, name: str) -> list[str]:
 def _say_whereabouts(thing: Thing) -> str:
     if thing.position is None:
         return ", nobody noted where"
-    return f" at {say_spot(thing.position)}, within {thing.uncertainty_m or 0.0:.1f} m"
+    radius_m = thing.uncertainty_m or 0.0
+    how_well = say_guess(radius_m) if thing.is_guessed else f"within {radius_m:.1f} m"
+    return f" at {say_spot(thing.position)}, {how_well}"

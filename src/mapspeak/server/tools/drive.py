@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.camera import aim, end_for_picture, scope_of
-from mapspeak.driving.exploration.trips import spread_headings, turn_to
+from mapspeak.driving.exploration.trips import TURN, spread_headings, turn_to
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.places.relations.viewpoints import choose_view, is_there
@@ -52,6 +52,7 @@ Wait = Annotated[
 ]
 LEAST_TURN_S = 0.5
 MOST_PICTURES = 12
+LOOK_AROUND = "a look around,"
 OVERLAP_RATIO = 1.1
 """A thing at the edge of one picture is whole in the next."""
 TurnBy = Annotated[
@@ -163,6 +164,7 @@ class DriveTools:
         robot, on_progress = self._session.robot, tell_progress(context)
         until_s = robot.now_s + wait_s
         report = await self._session.drives.wait(goal_id, wait_s=wait_s, on_progress=on_progress)
+        report = report if goal_id else report.as_asked
         drive = report.drive
         if wait_s > 0 and drive.caller.owner == current_caller().owner:
             left_s = max(until_s - robot.now_s, 0.0)
@@ -252,7 +254,7 @@ class ViewTools:
             if left_s < LEAST_TURN_S:
                 return [*shown, _say_rest(yaw_rad, "the time for one call is over")]
             with within_scope(scope):
-                report = await self._turn(context, yaw_rad, left_s)
+                report = await self._turn(context, yaw_rad, left_s, LOOK_AROUND)
             if report.status.state is not GoalState.ARRIVED:
                 await self._session.drives.cancel(report.drive.goal_id)
                 why = say_cause(report.status.cause) or f"the turn is {report.status.state}"
@@ -264,12 +266,15 @@ class ViewTools:
             shown += [sighting.text, sighting.image]
         return shown
 
-    async def _turn(self, context: Context, yaw_rad: float, wait_s: float) -> DriveReport:
+    async def _turn(
+        self, context: Context, yaw_rad: float, wait_s: float, what: str = TURN
+    ) -> DriveReport:
         return await turn_to(
             self._session,
             yaw_rad,
             wait_s=wait_s,
             on_progress=tell_progress(context),
+            what=what,
         )
 
 

@@ -27,13 +27,11 @@ from mapspeak.places.recall import events
 from mapspeak.places.recall.nearby import find_nearby
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.places.things import forget
+from mapspeak.server.text.episodes import describe_episodes, describe_nearby, say_episode
 from mapspeak.server.text.findings import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     describe_check,
-    describe_episodes,
-    describe_nearby,
     say_consequences,
-    say_episode,
 )
 from mapspeak.server.text.moments import AHEAD, PAST, read_coming, read_past
 from mapspeak.server.text.offered import lead
@@ -48,6 +46,7 @@ MOST_EPISODES = 20
 MOST_NEAR_SEEN = 8
 """Fewer observations beside things: what is near is mostly told by these."""
 MOST_SUMMED = 1000
+MOST_UNSUMMED = 5
 ALL = 1_000_000
 
 FromRow = Annotated[int, Field(description="go on from this row", ge=0, le=1_000_000, strict=True)]
@@ -170,9 +169,9 @@ class MemoryTools:
             return None
 
     def _list(self, query: EpisodeQuery, now: datetime | None, world: WorldModel | None) -> str:
-        """Return a page of observations; before the first of several all are summed up."""
+        """Return a page of observations; before the first of many all are summed up."""
         page = self._find(query, world)
-        if query.offset or page.next_page is None:
+        if query.offset or page.n_matches <= MOST_UNSUMMED:
             return describe_episodes(page, now=now)
         whole = self._find(replace(query, limit=MOST_SUMMED), world)
         return describe_episodes(page, now=now, summed=whole.matches)

@@ -7,9 +7,15 @@ from mcp.server.mcpserver import Context, Image
 from mcp_types import CallToolResult, ContentBlock, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
+from mapspeak.driving.routes.following import (
+    RouteBook,
+    RouteProgress,
+    RouteState,
+    WhenBlocked,
+)
 from mapspeak.driving.routes.ordering import RouteOrder
 from mapspeak.driving.routes.planning import RoutePlan
+from mapspeak.errors import GoalError
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import RouteAnswer
 from mapspeak.server.text.wording import shorten
@@ -52,6 +58,11 @@ Wait = Annotated[
 ]
 
 
+Drive = Annotated[
+    bool, Field(description="false: only plan: order, ways and time; nothing else changes")
+]
+
+
 class RouteTools:
     """Following routes."""
 
@@ -79,6 +90,8 @@ class RouteTools:
         pause_s: Pause = 0.0,
         when_blocked: Blocked = WhenBlocked.WAIT,
         wait_s: Wait = 20.0,
+        *,
+        drive: Drive = True,
     ) -> Annotated[CallToolResult, RouteAnswer]:
         """Drive the robot past several places, as given or on the shortest way.
 
@@ -86,6 +99,11 @@ class RouteTools:
         shortest. It sets out to the next stop only while it is called: call it again without stops
         to go on.
         """
+        if not drive:
+            progress = await self._routes.plan(
+                _require(stops), pause_s=pause_s, order=order, end_at=end_at
+            )
+            return _answer(progress)
         if stops is not None:
             plan = await self._routes.begin(
                 stops,
@@ -105,16 +123,26 @@ class RouteTools:
             robot = self._session.robot
             sees = progress.state is RouteState.AT_STOP and robot.description.has_camera
             shown = await self._look(context) if sees else []
-        report = RouteAnswer.of(progress)
-        text = TextContent(type="text", text=report.model_dump_json())
-        content: list[ContentBlock] = [text, *map(_as_content, shown)]
-        return CallToolResult(content=content, structured_content=report.model_dump(mode="json"))
+        return _answer(progress, shown)
 
     async def _look(self, context: Context) -> list[str | Image]:
         if self._looks_around:
             return await self._views.look_around(context)
         sighting = await look_ahead(self._session)
         return [sighting.text, sighting.image]
+
+
+def _require(stops: Sequence[str] | None) -> Sequence[str]:
+    if stops is None:
+        raise GoalError("There is nothing to plan.", hint="Give the stops.")
+    return stops
+
+
+def _answer(progress: RouteProgress, shown: Sequence[str | Image] = ()) -> CallToolResult:
+    report = RouteAnswer.of(progress)
+    text = TextContent(type="text", text=report.model_dump_json())
+    content: list[ContentBlock] = [text, *map(_as_content, shown)]
+    return CallToolResult(content=content, structured_content=report.model_dump(mode="json"))
 
 
 def _scope_of(stops: Sequence[str], plan: RoutePlan, *, looks_around: bool) -> ApprovalScope:

@@ -8,12 +8,12 @@ from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place
-from mapspeak.places.recall.asking import SURE_RATIO, describe_candidate
+from mapspeak.places.recall.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
 from mapspeak.places.ways import standing_point
 from mapspeak.robot import CameraPicture
-from mapspeak.server.text.findings import say_conflict, say_finding, say_support
+from mapspeak.server.text.findings import say_conflict, say_finding, say_guess, say_support
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import (
     join_words,
@@ -74,10 +74,10 @@ def thing_lines(world: WorldModel, remembered: RememberedThing) -> Iterator[str]
         yield "Where it is was not noted: no view says a direction."
     else:
         rooms = " or ".join(candidate.room_ids) or "no room"
-        yield (
-            f"At {say_point(thing.position)}, in {rooms}; within {thing.uncertainty_m:.1f} m of "
-            "that with 90 %."
-        )
+        radius_m = thing.uncertainty_m or 0.0
+        how_well = f"within {radius_m:.1f} m of that with 90 %"
+        how_well = say_guess(radius_m) if thing.is_guessed else how_well
+        yield f"At {say_point(thing.position)}, in {rooms}; {how_well}."
     yield from _view_lines(world, remembered)
     yield from _trust_lines(candidate.trust)
     if candidate.pictures:

@@ -130,6 +130,8 @@ def say_route(progress: RouteProgress) -> str:
         n_skipped = sum(stop.state is StopState.SKIPPED for stop in progress.plan.stops)
         left_out = f", {n_skipped} of them left out" if n_skipped else ""
         return f"No stop is left{left_out}."
+    if progress.state is RouteState.PLANNED:
+        return "The route is only planned."
     if progress.number is None:
         return _say_driving(progress)
     stop = progress.plan.stops[progress.number]

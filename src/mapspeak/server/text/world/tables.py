@@ -42,6 +42,7 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace
 
 MOST_WALKS = 6
+MOST_UNNOTED = 15
 AGAIN = "New or changed since your last look:"
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 MEANINGS = (
@@ -75,13 +76,24 @@ def describe_world(view: MapView, told: Told | None = None) -> str:
 
 
 def _say_explored(world: WorldModel) -> str:
-    """Say how much floor is known, and of how much: a share alone falls when more comes in view."""
+    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
+
+    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
+    """
     known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
     if not world.frontiers.frontiers:
         return f"{known_m2:.1f} m2 of free floor, {percent} %."
+    promised_m2 = expected_area_m2(world) - known_m2
     # Not all of it, as long as there is a frontier to go to.
-    expected = f"about {expected_area_m2(world):.0f} m2 of free floor, {min(percent, 99)} %."
-    return f"{known_m2:.1f} of {expected}"
+    return (
+        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
+        f"{_round(promised_m2)} m2 more for now."
+    )
+
+
+def _round(area_m2: float) -> str:
+    """Return an estimate with the one or two digits that it is good for."""
+    return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"
 
 
 def list_subjects(world: WorldModel) -> frozenset[str]:
@@ -102,6 +114,8 @@ def _summary(view: MapView, told: Told) -> str:
     if Layer.ROOMS in look.layers:
         shown = look.regions(world)
         lines += [say_sizes(world, shown), *_say_reachable(world, shown)]
+        if Layer.PLACES in look.layers and look.zoom is None:
+            lines += _say_unnoted(world)
     if Layer.FRONTIERS in look.layers and told.is_first:
         lines += _say_extremes(view)
     if view.unseen is not None:
@@ -118,6 +132,16 @@ def _summary(view: MapView, told: Told) -> str:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
         lines.append(f"Shown and listed: only what lies around {look.around.name}, {square}.")
     return "\n".join(lines)
+
+
+def _say_unnoted(world: WorldModel) -> Iterator[str]:
+    """Say which rooms nobody has noted anything of; nothing before the first note."""
+    if not world.places:
+        return
+    noted = {world.find_room_id(place.waypoint.pose.point) for place in world.places}
+    left = [room.id for room in _rooms_by_size(world.rooms.regions) if room.id not in noted]
+    told = list_some(left, most=MOST_UNNOTED)
+    yield f"Rooms without a note: {told}." if left else "Every room has a note."
 
 
 def _say_map(world: WorldModel) -> str:
