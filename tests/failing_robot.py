@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import anyio
+
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
@@ -16,6 +18,7 @@ class FailingRobot(FakeRobot):
     def __init__(self) -> None:
         super().__init__(two_rooms())
         self.is_reachable = True
+        self.is_mute = False
         self.tells_pose = True
         self.has_map_pose = True
         self.frozen_s: float | None = None
@@ -35,6 +38,8 @@ class FailingRobot(FakeRobot):
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
         self._answer()
+        if self.is_mute:
+            await anyio.sleep_forever()
         return await super().fetch_goal_status(robot_goal_id)
 
     async def send_goal(self, goal: Pose) -> str:

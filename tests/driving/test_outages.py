@@ -49,6 +49,18 @@ async def tell_nobody(_report: DriveReport) -> None:
     await anyio.lowlevel.checkpoint()
 
 
+async def test_a_wait_ends_though_the_robot_never_answers_again() -> None:
+    watched = Watched()
+    drive = await watched.send()
+    await watched.drives.wait(drive.goal_id, wait_s=0.5, on_progress=tell_nobody)
+    watched.robot.is_mute = True
+    with anyio.fail_after(10.0):
+        told = await watched.drives.wait(drive.goal_id, wait_s=0.1, on_progress=tell_nobody)
+    assert told.status.state is GoalState.DRIVING
+    assert told.pose_doubt is PoseDoubt.NO_ANSWER
+    assert not told.status.state.is_final
+
+
 @pytest.mark.parametrize("away_s", [1.0, 5.0, 9.0])
 async def test_after_a_short_outage_a_drive_is_taken_up_again(away_s: float) -> None:
     watched = Watched()

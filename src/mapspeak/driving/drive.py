@@ -16,7 +16,7 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.driving.drivemonitor import NEEDS_NO_STOP, PATIENCE_S, DriveMonitor, Look, OwedStop
-from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport
+from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, refuse_beside
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose
@@ -150,14 +150,14 @@ class DriveBook:
             if when_busy is WhenBusy.WAIT:
                 self.dismiss(Cause(code=CauseCode.REPLACED), owner=drive.caller.owner)
                 return self._keep(drive)
-            raise GoalError(
-                f"{busy.goal_id} to {busy.place} is under way.",
-                hint="Wait for its end, or end it.",
-                step=NextStep.WAIT_OR_CANCEL,
-            )
+            raise refuse_beside(busy)
 
-    async def report(self, goal_id: str | None = None) -> DriveReport:
+    async def report(
+        self, goal_id: str | None = None, *, within_s: float = PATIENCE_S
+    ) -> DriveReport:
         """Return how a drive stands, or stood when the robot was heard last; by default the latest.
+
+        A robot that has not answered `within_s` seconds of wall time counts as out of reach.
 
         Raises:
             GoalError: No drive has that id.
@@ -165,7 +165,7 @@ class DriveBook:
         if goal_id is None and not self._drives:
             await self._check_foreign_goals()
         drive = self._find(goal_id)
-        look = await self._monitor.look(drive)
+        look = await self._monitor.look(drive, within_s=within_s)
         drive = self._drives.get(drive.goal_id, drive)
         if drive.final is None:
             await self._note(drive, look)
@@ -188,8 +188,7 @@ class DriveBook:
 
         Cancelling the wait cancels the drive and stops the robot.
         """
-        if self._drives:
-            goal_id = self._find(goal_id).goal_id
+        goal_id = self._find(goal_id).goal_id if self._drives else goal_id
         try:
             return await self._wait(goal_id, wait_s, on_progress)
         except anyio.get_cancelled_exc_class():
@@ -200,16 +199,17 @@ class DriveBook:
     async def _wait(
         self, goal_id: str | None, wait_s: float, on_progress: OnProgress
     ) -> DriveReport:
-        waited_s, told_s, before_s = 0.0, 0.0, self._robot.now_s
-        report = await self.report(goal_id)
+        told_s, before_s = 0.0, self._robot.now_s
+        report = await self.report(goal_id, within_s=wait_s)
+        waited_s, before_s = max(self._robot.now_s - before_s, 0.0), self._robot.now_s
         while not report.status.state.is_final and waited_s < wait_s:
             try:
                 await self._robot.sleep(pause_s := min(POLL_S, max(wait_s - waited_s, 0.01)))
             except LinkError:
                 # The robot's clock stands: its time would be waited for without end.
-                return await self.report(report.drive.goal_id)
+                return await self.report(report.drive.goal_id, within_s=0.0)
             await self._start_next()
-            report = await self.report(report.drive.goal_id)
+            report = await self.report(report.drive.goal_id, within_s=wait_s - waited_s)
             # A simulation that is begun anew sets its clock back.
             waited_s += max(self._robot.now_s - before_s, pause_s)
             before_s = self._robot.now_s

@@ -25,6 +25,8 @@ SILENT_FOR_S = 10.0
 STEP_M = 0.05
 """A pose that has moved less may only have wavered."""
 LEAST_PACED_M = 1.0
+LEAST_LOOK_S = 1.0
+"""Wall time that a robot is given to answer, however short the wait is that was asked for."""
 STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
 WAITS = GoalStatus(state=GoalState.PLANNED, cause=Cause(code=CauseCode.WAITING))
 NEWS_S = 0.5
@@ -142,18 +144,22 @@ class DriveMonitor:
         # Kept until the drive under way is judged: this look may be for another.
         self._jump_m = self._jump_m if jump_m is None else jump_m
 
-    async def look(self, drive: Drive) -> Look:
-        """Ask how a drive stands and where the robot is."""
+    async def look(self, drive: Drive, *, within_s: float = PATIENCE_S) -> Look:
+        """Ask how a drive stands and where the robot is, by wall time within so long."""
         status, doubt = drive.final or drive.heard, PoseDoubt.NO_ANSWER
         try:
-            status = await self._fetch_status(drive)
-            doubt = PoseDoubt.NO_POSE
-            await self.find_robot()
+            with anyio.fail_after(max(within_s, LEAST_LOOK_S)):
+                status = await self._fetch_status(drive)
+                doubt = PoseDoubt.NO_POSE
+                await self.find_robot()
             if drive.final is None and status.state is GoalState.ARRIVED:
                 self.odometer.arrive(self._robot.now_s)
             return Look(status=status)
         except LinkError as error:
             return Look(status=status, doubt=doubt, error=error)
+        except TimeoutError:
+            late = LinkError("The robot has not answered in time.", hint="Wait, then ask again.")
+            return Look(status=status, doubt=doubt, error=late)
 
     async def _fetch_status(self, drive: Drive) -> GoalStatus:
         if drive.robot_goal_id is None:

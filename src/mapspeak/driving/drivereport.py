@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
@@ -78,6 +79,15 @@ class DriveReport:
         told = replace(drive, goal_id=asked.goal_id, place=asked.place, purpose=asked.purpose)
         before_s = drive.started_s - asked.started_s
         return replace(self, drive=told, elapsed_s=self.elapsed_s + max(before_s, 0.0))
+
+
+def refuse_beside(busy: Drive) -> GoalError:
+    """Return the refusal of a drive while another one is under way that must not be replaced."""
+    return GoalError(
+        f"{busy.goal_id} to {busy.place} is under way.",
+        hint="Wait for its end, or end it.",
+        step=NextStep.WAIT_OR_CANCEL,
+    )
 
 
 SAME_GOAL_M = 0.5

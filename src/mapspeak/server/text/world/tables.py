@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
-from mapspeak.driving.exploration.progress import expected_area_m2, known_area_m2, known_ratio
 from mapspeak.memory.quoting import quote
 from mapspeak.places.standing import choose_standing_point, find_standing_point
 from mapspeak.server.text.wording import (
@@ -26,6 +25,7 @@ from mapspeak.server.text.world.look import (
 )
 from mapspeak.server.text.world.maps import (
     say_doubtful_door,
+    say_explored,
     say_merits,
     say_navigation,
     say_ranks,
@@ -75,27 +75,6 @@ def describe_world(view: MapView, told: Told | None = None) -> str:
     return "\n\n".join([_summary(view, told), *closed, *filter(None, shown)])
 
 
-def _say_explored(world: WorldModel) -> str:
-    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
-
-    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
-    """
-    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
-    if not world.frontiers.frontiers:
-        return f"{known_m2:.1f} m2 of free floor, {percent} %."
-    promised_m2 = expected_area_m2(world) - known_m2
-    # Not all of it, as long as there is a frontier to go to.
-    return (
-        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
-        f"{_round(promised_m2)} m2 more for now."
-    )
-
-
-def _round(area_m2: float) -> str:
-    """Return an estimate with the one or two digits that it is good for."""
-    return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"
-
-
 def list_subjects(world: WorldModel) -> frozenset[str]:
     """Return what a reader may have been told of: ids, frontiers left out, and the picture."""
     regions, doors, places = world.rooms.regions, world.rooms.doors, world.places
@@ -109,7 +88,7 @@ def _summary(view: MapView, told: Told) -> str:
     lines = [
         *say_warnings(world),
         f"Robot: {say_pose(world.robot)}, in {room_id}.{width}",
-        f"Explored: {_say_explored(world)} {say_verdict(world.frontiers)}",
+        f"Explored: {say_explored(world)} {say_verdict(world.frontiers)}",
     ]
     if Layer.ROOMS in look.layers:
         shown = look.regions(world)
