@@ -147,10 +147,10 @@ class DriveBook:
                 drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
                 self._end_all(Cause(code=CauseCode.REPLACED), but=drive)
                 return drive
-            if when_busy is WhenBusy.WAIT:
-                self.dismiss(Cause(code=CauseCode.REPLACED), owner=drive.caller.owner)
-                return self._keep(drive)
-            raise refuse_beside(busy)
+            if when_busy is not WhenBusy.WAIT:
+                refuse_beside(busy)
+            self.dismiss(Cause(code=CauseCode.REPLACED), owner=drive.caller.owner)
+            return self._keep(drive)
 
     async def report(
         self, goal_id: str | None = None, *, within_s: float = PATIENCE_S

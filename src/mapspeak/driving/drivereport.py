@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NoReturn
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose
@@ -81,9 +82,13 @@ class DriveReport:
         return replace(self, drive=told, elapsed_s=self.elapsed_s + max(before_s, 0.0))
 
 
-def refuse_beside(busy: Drive) -> GoalError:
-    """Return the refusal of a drive while another one is under way that must not be replaced."""
-    return GoalError(
+def refuse_beside(busy: Drive) -> NoReturn:
+    """Refuse a drive while another one is under way that must not be replaced.
+
+    Raises:
+        GoalError: Always.
+    """
+    raise GoalError(
         f"{busy.goal_id} to {busy.place} is under way.",
         hint="Wait for its end, or end it.",
         step=NextStep.WAIT_OR_CANCEL,
