@@ -35,7 +35,7 @@ TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
 SOURCES = {
     "robot": ("links", "ros", "server/text/ros/outcomes.py"),
     "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
-    "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
+    "refused": ("safety", "places/goalcheck.py", "driving/drive.py", "driving/drivereport.py"),
     "files": (
         "spatial/mapfiles.py",
         "simulator/worlds/worldfiles.py",
