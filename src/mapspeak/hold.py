@@ -107,7 +107,7 @@ class Hold:
         found = {
             int(told["process"])
             for told in served
-            if address and told.get("address") == address and _is_running(told.get("process"))
+            if address and told.get("address") == address and is_running(told.get("process"))
         }
         return tuple(sorted(found - {os.getpid()}))
 
@@ -127,7 +127,7 @@ class Hold:
         return tuple(
             str(told.get("robot"))
             for path, told in _read_all(self.folder / SERVED)
-            if path.name not in answered and _is_running(told.get("process"))
+            if path.name not in answered and is_running(told.get("process"))
         )
 
     def _write(self, path: Path, text: str) -> None:
@@ -167,7 +167,7 @@ def _read_all(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
             yield path, told
 
 
-def _is_running(process: object) -> bool:
+def is_running(process: object) -> bool:
     """Return True unless a process has ended for sure; one that hangs still has a robot."""
     try:
         os.kill(int(str(process)), 0)

@@ -11,6 +11,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from mapspeak.hold import is_running
+
 logger = logging.getLogger(__name__)
 
 MOST_BYTES = 5_000_000
@@ -64,7 +66,9 @@ class MissionRecord:
         found: dict[str, Interrupted] = {}
         for line in self._read():
             run, event, said = str(line.get("run")), line.get("event"), str(line.get("said"))
-            if event == "begun" and not _is_alive(line.get("process")):
+            process = line.get("process")
+            # Another server goes on; this one has begun nothing before it looks.
+            if event == "begun" and (process == os.getpid() or not is_running(process)):
                 found[run] = Interrupted(said, str(line.get("at")))
             elif event == "step" and run in found:
                 found[run].steps += (said,)
@@ -106,16 +110,3 @@ class MissionRecord:
                 file.write(json.dumps(line) + "\n")
         except OSError as error:
             logger.warning("What missions do could not be noted: %s", error.strerror)
-
-
-def _is_alive(process: object) -> bool:
-    """Return True for another server that goes on; this one has begun nothing before it looks."""
-    if not isinstance(process, int) or process == os.getpid():
-        return False
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
