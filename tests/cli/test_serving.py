@@ -317,6 +317,7 @@ async def test_a_client_that_ends_before_its_answer_is_no_fault(tmp_path: Path) 
             assert process.stdin is not None
             assert process.stderr is not None
             await process.stdin.send(initialize_line())
+            await process.stdin.aclose()
             said = b"".join([part async for part in process.stderr])
             await process.wait()
     assert not said
