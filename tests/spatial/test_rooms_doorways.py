@@ -7,6 +7,9 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
+from mapspeak.spatial.rooms.floor import build_floor
+from mapspeak.spatial.rooms.raster import build_raster
+from mapspeak.spatial.rooms.segmentation import find_doorways
 
 CELL_M = 0.1
 
@@ -149,6 +152,16 @@ def test_cubicles_nearly_as_wide_open_as_they_are_wide_are_rooms() -> None:
 @pytest.mark.parametrize("angle_deg", [20.0, 60.0])
 def test_cubicles_are_found_on_a_turned_map(angle_deg: float) -> None:
     assert_cubicles_along_a_corridor(find_rooms(turned(drawn(CUBICLES), angle_deg)))
+
+
+def test_the_jambs_of_a_doorway_begin_on_solid_cells_at_both_sides() -> None:
+    raster = build_raster(drawn(CUBICLES))
+    floor = build_floor(raster)
+
+    roots = [root for doorway in find_doorways(raster, floor) for root in doorway.roots]
+
+    assert len(roots) == 6
+    assert all(floor.solid[round(row), round(col)] for col, row in roots)
 
 
 def test_every_free_cell_of_a_doorway_belongs_to_a_region() -> None:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomMap, find_rooms
+from mapspeak.spatial.rooms.floor import build_floor, find_walls
+from mapspeak.spatial.rooms.raster import build_raster
 
 Cells = NDArray[np.int8]
 Labels = NDArray[np.int16]
@@ -145,6 +147,34 @@ def test_unknown_ground_around_a_map_changes_nothing(before: int, after: int) ->
 
     window = found[before : before + N_ROWS, after : after + N_COLS]
     assert np.array_equal(window, divide(building()).labels)
+
+
+def furnished(seed: int) -> Cells:
+    """Draws the building with boxes at its walls, unseen inside, a slanting wall and noise."""
+    rng = np.random.default_rng(seed)
+    cells = building()
+    cv2.line(cells.view(np.uint8), (100, 130), (170, 190), (100,), 2)
+    for _ in range(12):
+        row, col = rng.integers(10, N_ROWS - 50), rng.integers(10, N_COLS - 50)
+        high, wide = rng.integers(6, 40, 2)
+        box = cells[row : row + high, col : col + wide]
+        box[1:-1, 1:-1] = -1
+        box[[0, -1]] = box[:, [0, -1]] = 100
+    cells[(cells == 100) & (rng.random(cells.shape) < 0.1)] = -1
+    return cells
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_map_upside_down_has_its_walls_and_floor_upside_down(seed: int) -> None:
+    upright, inverted = (
+        build_raster(OccupancyGrid(cells=cells, resolution_m=RESOLUTION_M))
+        for cells in (furnished(seed), furnished(seed)[::-1, ::-1])
+    )
+    wall, inverted_wall = (find_walls(each, [0.5, 22.5, 37.0])[0] for each in (upright, inverted))
+    floor, inverted_floor = (build_floor(each).floor for each in (upright, inverted))
+
+    assert np.array_equal(inverted_wall[::-1, ::-1], wall)
+    assert np.array_equal(inverted_floor[::-1, ::-1], floor)
 
 
 def test_another_origin_moves_places_and_changes_nothing_else(labels: Labels) -> None:

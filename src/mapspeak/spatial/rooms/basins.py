@@ -172,12 +172,10 @@ def _climb(basins: Basins, cells: IntArray, cell_size_m: float) -> FloatArray:
     n_steps = [round(rise_m / cell_size_m) for rise_m in RISES_M]
     found = []
     for here in cells:
-        at = here
-        for step in range(1, n_steps[-1] + 1):
-            at = basins.ascent[at]
-            if step in n_steps:
-                found += [heights[at]] * n_steps.count(step)
-        found += [heights[at]] * n_steps.count(0)
+        way = [here]
+        for _ in range(n_steps[-1]):
+            way.append(basins.ascent[way[-1]])
+        found += [heights[way[n]] for n in n_steps]
     return np.stack(found, axis=1).astype(np.float64)
 
 

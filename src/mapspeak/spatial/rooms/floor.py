@@ -178,6 +178,8 @@ def _line(length: float, angle_deg: float) -> Picture:
     dy = math.sin(math.radians(angle_deg)) * length / 2
     ends = [(round(half + sign * dx), round(half + sign * dy)) for sign in (-1, 1)]
     cv2.line(picture, ends[0], ends[1], 1)
+    # OpenCV's steps differ from one end to the other; what is opened is to stay in its place.
+    picture |= picture[::-1, ::-1]
     # OpenCV is far faster with a full row or column than with a square that holds one.
     wide, high = (max(abs(end[axis] - half) for end in ends) for axis in (0, 1))
     return picture[half - high : half + high + 1, half - wide : half + wide + 1].copy()

@@ -172,7 +172,7 @@ def _find_stubs(
     chair, or a speck on a wall.
     """
     across = 1 - axis
-    seen = open_box(widen(seen_wall, 1), *line_along(2 * cells.stub, axis).shape)
+    seen = open_box(widen(seen_wall, 1), *line_along(2 * cells.stub + 1, axis).shape)
     # What is widened so that runs bear a step aside is not to be longer for it.
     held = seen & solid & np.asarray(cv2.dilate(seen_wall, line_along(3, across)), np.uint8)
     for _ in range(cells.thin):

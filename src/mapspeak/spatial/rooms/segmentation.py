@@ -181,7 +181,7 @@ def _doorway(
     root, start, end, other_root = (
         (float(x), float(y))
         for x, y in (
-            back @ (col, row, 1.0) for col in (first - left, first - 1, stop, stop + right)
+            back @ (col, row, 1.0) for col in (first - left, first - 1, stop, stop + right - 1)
         )
     )
     width_m = (stop - first) * cell_size_m
