@@ -339,6 +339,13 @@ def test_a_wall_seen_only_in_pieces_is_wall_all_along() -> None:
     assert max(door.width_m for door in rooms.doors) < 0.5
 
 
+def test_a_few_specks_askew_that_vanish_on_the_raster_are_no_rooms() -> None:
+    cells = np.full((40, 40), -1, np.int8)
+    cells[range(2, 38, 9), range(1, 17, 4)] = cells[1, 1] = 100
+
+    assert find_rooms(OccupancyGrid(cells=cells, resolution_m=0.01)).regions == ()
+
+
 @pytest.mark.slow
 def test_a_map_of_ten_thousand_cells_a_side_is_divided() -> None:
     grid = OccupancyGrid(cells=np.zeros((10_000, 10_000), np.int8), resolution_m=0.05)

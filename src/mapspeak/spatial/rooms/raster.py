@@ -240,8 +240,9 @@ def _between_centres(there: Affine) -> Affine:
 
 
 def _extent(used: NDArray[np.bool_]) -> slice:
+    """Return the part from the first set place to the last; of none the first place."""
     places = np.flatnonzero(used)
-    return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 0)
+    return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 1)
 
 
 def _factors(n_cells: int, resolution_m: float) -> tuple[int, int]:
