@@ -364,6 +364,23 @@ def test_a_map_of_too_many_cells_is_refused_with_what_to_do() -> None:
     assert error.value.hint == "Ask for a part of it, or for a map at a coarser resolution."
 
 
+def test_a_map_with_too_long_a_side_is_refused_with_what_to_do() -> None:
+    grid = OccupancyGrid(cells=np.zeros((20, 33_000), np.int8), resolution_m=0.05)
+
+    with pytest.raises(MapError, match="33000 cells, more than 32000") as error:
+        find_rooms(grid)
+    assert error.value.hint == "Ask for a part of it, or for a map at a coarser resolution."
+
+
+def test_a_tunnel_of_coarse_cells_is_divided_however_long() -> None:
+    cells = np.full((14, 9000), 100, np.int8)
+    cells[2:12, 2:-2] = 0
+
+    (tunnel,) = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.2)).regions
+
+    assert tunnel.free_area_m2 == pytest.approx(10 * 8996 * 0.2**2)
+
+
 @pytest.mark.slow
 def test_of_more_rooms_than_labels_can_tell_apart_the_rest_is_left_out() -> None:
     cells = np.zeros((6000, 6000), np.int8)

@@ -85,6 +85,8 @@ _LEAST_COVER, _HALF_COVER = 64, 128
 
 MAX_GRID_CELLS = 120_000_000
 MAX_RASTER_CELLS = 5_000_000
+MAX_SIDE_CELLS = 32_000
+"""OpenCV counts the rows and columns of what it warps in 16 bits."""
 MAX_UPSCALING = 4
 
 
@@ -146,6 +148,9 @@ def find_cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.in
     return rows, cols
 
 
+_ASK_FOR_LESS = "Ask for a part of it, or for a map at a coarser resolution."
+
+
 def build_raster(grid: OccupancyGrid) -> Raster:
     """Return the known part of a map in cells of about the size set, its walls upright.
 
@@ -155,12 +160,17 @@ def build_raster(grid: OccupancyGrid) -> Raster:
     if grid.cells.size > MAX_GRID_CELLS:
         raise MapError(
             f"The map has {grid.cells.size} cells, more than {MAX_GRID_CELLS}.",
-            hint="Ask for a part of it, or for a map at a coarser resolution.",
+            hint=_ASK_FOR_LESS,
+        )
+    if max(grid.cells.shape) > MAX_SIDE_CELLS:
+        raise MapError(
+            f"One side of the map has {max(grid.cells.shape)} cells, more than {MAX_SIDE_CELLS}.",
+            hint=_ASK_FOR_LESS,
         )
     is_known = grid.cells >= 0
     rows, cols = _extent(np.any(is_known, axis=1)), _extent(np.any(is_known, axis=0))
     known = grid.cells[rows, cols]
-    shrink, grow = _factors(known.size, grid.resolution_m)
+    shrink, grow = _factors(known.shape, grid.resolution_m)
     if known.size == 0:
         known = np.full((1, 1), UNKNOWN, np.int8)
     cell_size_m = grid.resolution_m * shrink / grow
@@ -245,13 +255,14 @@ def _extent(used: NDArray[np.bool_]) -> slice:
     return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 1)
 
 
-def _factors(n_cells: int, resolution_m: float) -> tuple[int, int]:
+def _factors(shape: tuple[int, ...], resolution_m: float) -> tuple[int, int]:
     """Return by how much to shrink and to grow; one of the two is 1."""
+    n_cells = math.prod(shape)
     shrink = max(1, round(SETTINGS.cell_size_m / resolution_m))
     while n_cells / shrink**2 > MAX_RASTER_CELLS:
         shrink += 1
     grow = min(MAX_UPSCALING, max(1, round(resolution_m / SETTINGS.cell_size_m)))
-    while grow > 1 and n_cells * grow**2 > MAX_RASTER_CELLS:
+    while grow > 1 and (n_cells * grow**2 > MAX_RASTER_CELLS or max(shape) * grow > MAX_SIDE_CELLS):
         grow -= 1
     return (shrink, 1) if shrink > 1 else (1, grow)
 
