@@ -42,8 +42,8 @@ from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
-LEAST_WALL_M, WALL_PER_M = 0.4, 0.05
-"""New wall all around a place that is worth a drive there: at least, and for a metre of way."""
+DRIVE_WORTH_M = 0.55
+"""So much new wall all around a place is worth a drive there."""
 MOST_ORDERED = 9
 """What is farther off does not come first, and all orders of these are looked at."""
 SAME_SPOT_M = 0.15
@@ -109,17 +109,16 @@ def _cover_walls(
     world: WorldModel, shown: Mask, half_rad: float, can_be: Callable[[Target], bool]
 ) -> Iterator[Target]:
     """Return stops that show all the wall worth a drive: greedily, who shows most first."""
-    points, ways_m = spread_places(world)
+    points, _ = spread_places(world)
     walls = find_walls_by_heading(world.grid, points)
-    least_m = LEAST_WALL_M + WALL_PER_M * ways_m
+    is_left = np.ones(len(points), dtype=np.bool_)
     while True:
         new_m = walls.measure_new(shown)
-        total_m = new_m.sum(axis=1)
-        total_m[total_m < least_m] = 0.0
-        if not total_m.any():
+        total_m = new_m.sum(axis=1) * is_left
+        if not (total_m >= DRIVE_WORTH_M).any():
             return
         index = int(total_m.argmax())
-        least_m[index] = math.inf
+        is_left[index] = False
         target = _target(Point(*points[index].tolist()), new_m[index], half_rad)
         if can_be(target):
             yield target

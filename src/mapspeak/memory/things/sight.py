@@ -94,7 +94,9 @@ def build_sight_map(grid: OccupancyGrid) -> SightMap:
     # Nobody sees into furniture, so that its inside is unknown, too.
     cleared = build_cleared(grid, block_m=ROW_M)
     walls = grid.occupied & ~_small_parts(grid, grid.occupied) & ~cleared
-    blocked = walls | (grid.unknown & ~_small_parts(grid, grid.unknown) & ~cleared)
+    # A row may be long; what nobody has seen in it yet may be anything but its inside.
+    inside = _small_parts(grid, grid.unknown) | _small_parts(grid, grid.unknown & cleared)
+    blocked = walls | (grid.unknown & ~inside)
     blocked |= _run_on(blocked, grid)
     factor = max(round(LATTICE_M / grid.resolution_m), 1)
     shares, rows, cols = _summarise(grid.occupied, factor)
