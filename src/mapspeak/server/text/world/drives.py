@@ -4,7 +4,14 @@ from collections import Counter
 
 from mapspeak.driving.drivereport import Drive
 from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
-from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
+from mapspeak.driving.exploration.progress import (
+    BoundKind,
+    ExplorationState,
+    Progress,
+    expected_area_m2,
+    known_area_m2,
+    known_ratio,
+)
 from mapspeak.driving.exploration.trips import Target
 from mapspeak.driving.routes.following import RouteProgress, RouteState
 from mapspeak.driving.routes.planning import RouteStop, StopState
@@ -18,6 +25,7 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_point
 from mapspeak.server.text.world.maps import say_merits, say_refusal
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
+from mapspeak.worldmodel.model import WorldModel
 
 WORDS = {
     CauseCode.CANCELLED: "It was cancelled.",
@@ -356,3 +364,24 @@ def _say_why(candidate: SearchCandidate) -> str:
     what = "unknown or unseen floor" if candidate.frontier else "floor not looked at yet"
     liking = "" if candidate.score == 0.5 else f", score {candidate.score:.2f}"
     return f"{candidate.area_m2:.1f} m2 of {what}, {away}{liking}"
+
+
+def say_explored(world: WorldModel) -> str:
+    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
+
+    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
+    """
+    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
+    if not world.frontiers.frontiers:
+        return f"{known_m2:.1f} m2 of free floor, {percent} %."
+    promised_m2 = expected_area_m2(world) - known_m2
+    # Not all of it, as long as there is a frontier to go to.
+    return (
+        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
+        f"{_round(promised_m2)} m2 more for now."
+    )
+
+
+def _round(area_m2: float) -> str:
+    """Return an estimate with the one or two digits that it is good for."""
+    return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"
