@@ -3,6 +3,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -108,6 +109,15 @@ def test_a_text_without_a_pose_is_no_map_text() -> None:
         read_map_text("## Rooms\nid | kind\nR1 | room")
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """What is begun in the background ignores SIGINT, and so would the programs it begins."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_early_signal_stops_it_with_one_line(tmp_path: Path, number: signal.Signals) -> None:
     world = tmp_path / "flat.yaml"
