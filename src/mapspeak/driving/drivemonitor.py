@@ -25,6 +25,7 @@ SILENT_FOR_S = 10.0
 STEP_M = 0.05
 """A pose that has moved less may only have wavered."""
 LEAST_PACED_M = 1.0
+"""Shorter drives say nothing of the pace: they are mostly turning and stopping."""
 LEAST_LOOK_S = 1.0
 """Wall time that a robot is given to answer, however short the wait is that was asked for."""
 STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
@@ -56,7 +57,7 @@ class Odometer:
         self._begun_m, self._begun_s = self.driven_m, now_s
 
     def arrive(self, now_s: float) -> None:
-        """Note when it has arrived; short drives are mostly turning and stopping."""
+        """Note when it has arrived."""
         drive_m, drive_s = self.driven_m - self._begun_m, now_s - self._begun_s
         if drive_m >= LEAST_PACED_M and drive_s > 0:
             self._paced_m += drive_m

@@ -56,6 +56,7 @@ TURN_S = 10.0
 MOST_DRIVES = 4
 """To the goal, to where it fits after more of it is mapped, and the turn."""
 SCOPE_S = 600.0
+EXPLORING_LOOK = "a look while exploring,"
 
 
 def is_view_due(robot: Pose, views: Sequence[CameraView]) -> bool:
@@ -173,9 +174,6 @@ def scope_of(place: str) -> ApprovalScope:
     """Return what a person agrees to at once: the drive to a place, and what ends it there."""
     what = f"drive to {place} and turn there to look"
     return ApprovalScope(what=what, n_drives=MOST_DRIVES, duration_s=SCOPE_S)
-
-
-EXPLORING_LOOK = "a look while exploring,"
 
 
 async def turn_for_picture(site: PictureContext, *, on_progress: OnProgress) -> None:
