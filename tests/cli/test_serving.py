@@ -5,6 +5,7 @@ import os
 import pty
 import re
 import shlex
+import signal
 import socket
 import subprocess
 import sys
@@ -290,16 +291,20 @@ async def test_the_robots_map_is_written_when_a_signal_ends_the_server(
         async with await anyio.open_process(
             [*command, *options], env=environment(tmp_path)
         ) as process:
+            assert process.stderr is not None
+            said = b""
             if transport == "http":
-                assert process.stderr is not None
-                await process.stderr.receive()
+                while b"(Ctrl-C ends it)" not in said:
+                    said += await process.stderr.receive()
             else:
                 assert process.stdout is not None
                 assert process.stdin is not None
                 await process.stdin.send(initialize_line())
                 await process.stdout.receive()
             process.terminate()
+            said += b"".join([part async for part in process.stderr])
             await process.wait()
+    assert process.returncode == 128 + signal.SIGTERM, said
     assert load_map(path).grid.free.any()
     assert read_state_log(log)
 
