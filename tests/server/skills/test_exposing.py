@@ -211,6 +211,53 @@ async def test_a_type_that_cannot_be_described_is_left_out_and_the_others_are_no
     assert not [name for name in tools if "circle" in name]
 
 
+async def test_a_type_that_was_not_found_is_tried_again_and_told_of_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    _, topic = listened()
+    system = tool_system(Dialect.ROS2, topic, more=ARM)
+    describes = system.find_service("/rosapi/topics_and_raw_types")
+    assert describes is not None
+    system.withdraw(describes.name)
+    async with exposed(system, tmp_path) as caller:
+        exposure = caller.server.exposure
+        assert exposure is not None
+        exposure.kept_s = 0.0
+        for _ in range(3):
+            await exposure.look()
+        before = await caller.tools()
+        system.offer(describes.name, describes.type, node=describes.node, answer=describes.answer)
+        await exposure.look()
+        after = await caller.tools()
+    told = [each for each in caplog.messages if "is not exposed" in each]
+    assert "publish_tool_grip" not in before
+    assert "publish_tool_grip" in after
+    assert len(told) == 1
+
+
+async def test_a_file_of_a_mission_that_is_called_as_an_exposed_tool_takes_not_its_place(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    system = tool_system(Dialect.ROS2)
+    asked = offer_switch(system)
+    async with exposed(system, tmp_path) as caller:
+        await caller.until(lambda tools: "tool_light" in tools)
+        await caller.ask("save_mission", name="visit", tree="- wait: 1\n")
+        path = tmp_path / "semantic_map.memory" / "missions" / "visit.yaml"
+        path.write_text(path.read_text().replace("visit", "tool_light"))
+        told = await caller.ask("show_missions")
+        tools = await caller.tools()
+        await caller.ask("tool_light", data=True)
+        await caller.ask("run_mission", tree="- tool_light: true\n")
+        no_mission = await caller.refuse("run_mission", name="tool_light")
+    assert asked == [{"data": True}, {"data": True}]
+    assert tools["tool_light"].input_schema["properties"].keys() == {"data"}
+    assert "visit" not in tools
+    assert "calls /tool/light" in told
+    assert "No mission is called" in no_mission
+    assert f"{path}: 'tool_light' is taken." in caplog.text
+
+
 async def test_a_tool_of_ours_keeps_its_name(tmp_path: Path) -> None:
     system = tool_system(Dialect.ROS2)
     offer_switch(system, "/stop_robot")

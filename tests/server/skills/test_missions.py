@@ -620,6 +620,21 @@ async def test_a_file_of_a_mission_that_is_called_as_a_tool_takes_no_tools_place
     assert names.count("stop_robot") == 1
 
 
+async def test_a_file_of_a_mission_that_is_called_as_a_skill_of_the_robot_takes_not_its_place(
+    tmp_path: Path,
+) -> None:
+    lift = FakeSkill(spec("lift"))
+    async with missions(tmp_path, lift) as caller:
+        await caller.ask("save_mission", name="visit", tree="- wait: 1\n")
+        path = tmp_path / "semantic_map.memory" / "missions" / "visit.yaml"
+        path.write_text(path.read_text().replace("visit", "lift"))
+        await caller.ask("show_missions")
+        await caller.ask("lift")
+    async with missions(tmp_path, lift) as caller:
+        await caller.ask("lift")
+    assert len(lift.given) == 2
+
+
 async def test_a_skill_that_is_called_as_a_tool_is_refused_at_the_start(tmp_path: Path) -> None:
     written = "skills:\n- name: stop_robot\n  mission:\n  - wait: 1\n"
     with pytest.raises(ConfigError, match="stop_robot"):

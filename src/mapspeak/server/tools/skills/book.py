@@ -113,17 +113,25 @@ class SkillBook:
             logger.warning("%s", error)
 
     def load_saved(self) -> None:
-        """Read the saved missions anew; people may have edited the files."""
-        before, self.saved = self.saved, {}
+        """Read the saved missions anew; people may have edited the files.
+
+        One that is called as another skill or tool takes no place of it.
+        """
+        saved: dict[str, Mission] = {}
         for path in sorted(self.folder.glob("*.yaml")):
             try:
                 entries = load_skills(path)
             except ConfigError as error:
                 logger.warning("%s", error)
                 continue
-            for each in entries:
-                if each.calls is Called.MISSION:
-                    self.saved[each.name] = self.desk.open(each, path)
+            for each in (entry for entry in entries if entry.calls is Called.MISSION):
+                try:
+                    self.check_free(each.name)
+                except SkillError as error:
+                    logger.warning("%s: %s", path, error)
+                    continue
+                saved[each.name] = self.desk.open(each, path)
+        before, self.saved = self.saved, saved
         if self._board is not None:
             for name in before.keys() - self.saved.keys():
                 self._board.take_down(name)

@@ -26,7 +26,7 @@ MOST_EXPOSED = 100
 EVERY_S = 2.0
 """Wall time between two looks at the robot's interfaces."""
 KEPT_S = 20.0
-"""Wall time for which a type, or the ends of a topic, are not asked for again while it is there."""
+"""Wall time for which a type, the ends of a topic, or one that failed, are not tried again."""
 PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
 PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
 
@@ -43,6 +43,7 @@ class Exposure:
         patterns: Of full names, as the shell writes them: "/gripper/*".
         tell: Tells clients where tools have changed.
         every_s: Between two looks.
+        kept_s: For which an answer is kept, and one that could not be put up is left out.
     """
 
     ros: RosAccess
@@ -51,8 +52,9 @@ class Exposure:
     _: KW_ONLY
     tell: Callable[[], Awaitable[None]]
     every_s: float = EVERY_S
+    kept_s: float = KEPT_S
     _offered: dict[Interface, str] = field(default_factory=dict)
-    _left_out: set[Interface] = field(default_factory=set)
+    _left_out: dict[Interface, float] = field(default_factory=dict)
     _answers: dict[tuple[Called, str], tuple[list[Interface], float]] = field(default_factory=dict)
 
     async def keep_looking(self) -> None:
@@ -81,14 +83,16 @@ class Exposure:
         found = await self._find()
         for gone in [each for each in self._offered if each not in found]:
             self.board.take_down(self._offered.pop(gone))
-        self._left_out &= set(found)
+        self._left_out = {each: at_s for each, at_s in self._left_out.items() if each in found}
         for interface in found:
-            if interface not in self._offered and interface not in self._left_out:
+            if interface not in self._offered:
                 await self._offer(interface)
         await self.tell()
 
     async def _offer(self, interface: Interface) -> None:
-        """Put up one interface; one that cannot be is told of once."""
+        """Put up one interface; one that cannot be is tried again later, and told of once."""
+        if anyio.current_time() < self._left_out.get(interface, -math.inf) + self.kept_s:
+            return
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
         name = name_tool(base, taken=self.board.taken_names)
         try:
@@ -98,9 +102,11 @@ class Exposure:
             self._check_policy(interface)
             skill = await open_interface(interface, self.ros, name=name, reserved=RESERVED)
         except MapspeakError as error:
-            self._left_out.add(interface)
-            logger.warning("%s is not exposed: %s", interface.name, error)
+            if interface not in self._left_out:
+                logger.warning("%s is not exposed: %s", interface.name, error)
+            self._left_out[interface] = anyio.current_time()
             return
+        self._left_out.pop(interface, None)
         self.board.put_up(skill)
         self._offered[interface] = name
 
@@ -141,7 +147,7 @@ class Exposure:
     async def _ask(self, called: Called, name: str, kind: str) -> list[Interface]:
         """Return what is found for a name; reuse a recent answer, or at an error the last one."""
         known, asked_s = self._answers.get((called, name), ([], -math.inf))
-        if anyio.current_time() < asked_s + KEPT_S:
+        if anyio.current_time() < asked_s + self.kept_s:
             return known
         with suppress(LinkError):
             known = await self._fetch(called, name, kind)
