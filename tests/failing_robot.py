@@ -21,6 +21,7 @@ class FailingRobot(FakeRobot):
         self.is_mute = False
         self.tells_pose = True
         self.has_map_pose = True
+        self.is_clock_still = False
         self.frozen_s: float | None = None
         self.seen = StampedPose(self.pose, 0.0)
 
@@ -34,7 +35,7 @@ class FailingRobot(FakeRobot):
         if not self.tells_pose:
             raise LinkError("No transform has come.", hint="Check SLAM.")
         here = self.seen if self.frozen_s is not None else await super().fetch_pose()
-        return replace(here, is_odometry=not self.has_map_pose)
+        return replace(here, is_odometry=not self.has_map_pose, is_clock_still=self.is_clock_still)
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
         self._answer()

@@ -97,8 +97,10 @@ class StampedPose:
 
     def find_doubt(self, now_s: float) -> PoseDoubt | None:
         """Return why the robot may be elsewhere; None for a fresh pose on the map."""
+        if self.is_clock_still:
+            return PoseDoubt.CLOCK_STANDS
         if self.silent_s > OLD_POSE_S:
-            return PoseDoubt.CLOCK_STANDS if self.is_clock_still else PoseDoubt.SILENT_POSE
+            return PoseDoubt.SILENT_POSE
         if now_s - self.stamp_s > OLD_POSE_S:
             return PoseDoubt.OLD_POSE
         return PoseDoubt.ODOMETRY if self.is_odometry else None
@@ -238,6 +240,7 @@ class CauseCode(StrEnum):
     POSE_JUMPED = "pose_jumped"
     POSE_UNKNOWN = "pose_unknown"
     ROBOT_SILENT = "robot_silent"
+    CLOCK_STANDS = "clock_stands"
     NOT_BEGUN = "not_begun"
     NOT_MOVED = "not_moved"
     STOOD_STILL = "stood_still"

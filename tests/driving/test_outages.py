@@ -25,7 +25,8 @@ class Watched:
 
     def __init__(self) -> None:
         self.robot = FailingRobot()
-        self.drives = DriveBook(self.robot, wall_s=lambda: self.robot.now_s)
+        self.stood_s = 0.0
+        self.drives = DriveBook(self.robot, wall_s=lambda: self.robot.now_s + self.stood_s)
 
     async def send(self, goal: Pose = FAR) -> Drive:
         with self.drives.preparing() as ticket:
@@ -39,6 +40,12 @@ class Watched:
     async def lose_robot(self, duration_s: float) -> None:
         self.robot.is_reachable = False
         await self.pass_time(duration_s)
+
+    async def stop_clock(self, duration_s: float) -> None:
+        self.robot.is_clock_still = True
+        for _ in range(round(duration_s / STEP_S)):
+            self.stood_s += STEP_S
+            await self.drives.watch()
 
     @property
     def is_driving(self) -> bool:
@@ -278,14 +285,41 @@ async def test_waiting_ends_when_the_robots_clock_stands() -> None:
     assert report.status.state is GoalState.DRIVING
 
 
+async def test_a_drive_whose_robots_clock_has_died_is_ended_and_stopped() -> None:
+    watched = Watched()
+    drive = await watched.send()
+    await watched.pass_time(2.0)
+    await watched.stop_clock(9.0)
+    told = await watched.drives.report(drive.goal_id)
+    assert (told.status.state, told.pose_doubt) == (GoalState.DRIVING, PoseDoubt.CLOCK_STANDS)
+    await watched.stop_clock(2.0)
+    told = await watched.drives.report(drive.goal_id)
+    assert told.status.state is GoalState.LOST
+    assert code_of(told.status) is CauseCode.CLOCK_STANDS
+    assert not watched.is_driving
+    assert watched.robot.n_stops == 1
+
+
+async def test_a_drive_goes_on_where_the_robots_clock_has_stood_for_a_moment() -> None:
+    watched = Watched()
+    drive = await watched.send()
+    for _ in range(3):
+        await watched.stop_clock(9.0)
+        watched.robot.is_clock_still = False
+        await watched.pass_time(2.0)
+    assert (await watched.drives.report(drive.goal_id)).status.state is GoalState.DRIVING
+    assert watched.robot.n_stops == 0
+
+
 def test_a_pose_is_doubted_when_it_is_old_silent_or_odometry() -> None:
     here = Pose(1.0, 2.0)
     assert StampedPose(here, 9.0).find_doubt(10.0) is None
     assert StampedPose(here, 5.0).find_doubt(10.0) is PoseDoubt.OLD_POSE
     assert StampedPose(here, 10.0, silent_s=9.0).find_doubt(10.0) is PoseDoubt.SILENT_POSE
     assert StampedPose(here, 1.0, silent_s=9.0).find_doubt(10.0) is PoseDoubt.SILENT_POSE
-    paused = StampedPose(here, 10.0, silent_s=9.0, is_clock_still=True)
-    assert paused.find_doubt(10.0) is PoseDoubt.CLOCK_STANDS
+    for silent_s in (0.0, 9.0):
+        paused = StampedPose(here, 10.0, silent_s=silent_s, is_clock_still=True)
+        assert paused.find_doubt(10.0) is PoseDoubt.CLOCK_STANDS
     assert StampedPose(here, 9.0, is_odometry=True).find_doubt(10.0) is PoseDoubt.ODOMETRY
     assert StampedPose(here, 12.0).measure_age_s(10.0) == 0.0
     assert StampedPose(here, 10.0, silent_s=9.0).measure_age_s(10.0) == 9.0

@@ -16,7 +16,7 @@ from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Policy
 from rosbridge_robot import ScriptedRobot
-from rosserved import Caller, on_our_server, on_script, served
+from rosserved import Caller, at_time, on_our_server, on_script, served
 
 pytestmark = pytest.mark.anyio
 both = pytest.mark.parametrize("dialect", Dialect)
@@ -67,6 +67,31 @@ async def test_nothing_is_published_before_the_robot_knows_that_somebody_will(
         await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
         await scripted.until(lambda: published(scripted))
     assert before == [0, 0, 0]
+
+
+async def test_after_a_loss_a_topic_is_advertised_and_noticed_again_before_a_message(
+    tmp_path: Path,
+) -> None:
+    scripted, known = listening(ScriptedRobot()), list[bool]()
+
+    def tell(_: object) -> dict[str, list[str]]:
+        is_known = any(each.asked("advertise") for each in scripted.server.present)
+        known.append(is_known)
+        return {"publishers": ["/rosbridge_websocket"] if is_known else []}
+
+    scripted.services["/rosapi/publishers"] = tell
+    async with at_time(scripted, tmp_path, 0.0) as (client, caller):
+        await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
+        known.clear()
+        await scripted.server.drop_all()
+        while client.n_connections < 2:
+            await anyio.lowlevel.checkpoint()
+        await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
+        await scripted.until(lambda: len(published(scripted)) == 2)
+        latest = next(each for each in scripted.server.present if each.asked("publish"))
+    assert known[-1:] == [True]
+    asked = [each["op"] for each in latest.operations if each.get("topic") == "/cmd_vel"]
+    assert asked.index("advertise") < asked.index("publish")
 
 
 async def test_a_velocity_without_an_end_is_refused(tmp_path: Path) -> None:

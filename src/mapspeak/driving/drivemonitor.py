@@ -178,7 +178,7 @@ class DriveMonitor:
 
     def judge(self, look: Look) -> GoalStatus | None:
         """Return how the drive under way has to end; None where it may go on."""
-        if look.error is not None:
+        if look.error is not None or self._seen.is_clock_still:
             return self._judge_silence(look.error)
         if self._is_silent:
             # What happened in the silence is unknown: the robot may have moved all the time.
@@ -189,15 +189,21 @@ class DriveMonitor:
             return GoalStatus(state=GoalState.LOST, cause=cause)
         return self._judge_progress(look.status)
 
-    def _judge_silence(self, error: LinkError) -> GoalStatus | None:
+    def _judge_silence(self, error: LinkError | None) -> GoalStatus | None:
+        """Return that a drive is lost after a while without an answer, or without robot time.
+
+        Where that stands nothing else that is measured in it would ever end the drive.
+        """
         now_s = self._wall_s()
         self._heard_s = now_s if self._heard_s is None else self._heard_s
         self._is_silent = True
         silent_s = now_s - self._heard_s
         if silent_s < SILENT_FOR_S:
             return None
-        code = CauseCode.ROBOT_SILENT
-        cause = Cause(code=code, after_s=silent_s, quote=error.message)
+        code, quote = CauseCode.CLOCK_STANDS, ""
+        if error is not None and not self._seen.is_clock_still:
+            code, quote = CauseCode.ROBOT_SILENT, error.message
+        cause = Cause(code=code, after_s=silent_s, quote=quote)
         return GoalStatus(state=GoalState.LOST, cause=cause)
 
     def _judge_progress(self, status: GoalStatus) -> GoalStatus | None:

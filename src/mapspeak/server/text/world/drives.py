@@ -46,6 +46,9 @@ WORDS = {
         "The robot was stopped: where it is was unknown for {after_s:.0f} s. {quote}"
     ),
     CauseCode.ROBOT_SILENT: "The robot was silent for {after_s:.0f} s. {quote}",
+    CauseCode.CLOCK_STANDS: (
+        "The robot's clock has stood for {after_s:.0f} s: a simulation is paused or has ended."
+    ),
     CauseCode.NOT_BEGUN: (
         "The navigation has not begun for {after_s:.0f} s; the goal was withdrawn."
     ),

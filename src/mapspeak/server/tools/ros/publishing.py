@@ -1,5 +1,6 @@
 """Publishing for the model: once or for a time, one velocity at a time, a stand after each."""
 
+import math
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -87,22 +88,24 @@ class Publisher:
     def __init__(self, session: Session, inquiry: RosInquiry) -> None:
         self._session = session
         self._inquiry = inquiry
-        self._advertised: set[tuple[str, str]] = set()
+        self._known_s: dict[tuple[str, str], float] = {}
         self._moving: dict[str, PublishRun] = {}
 
     async def prepare(self, topic: str, type_name: str) -> None:
         """Advertise a topic, and wait until the robot has noticed or cannot answer.
 
-        It stays advertised: the robot's brake may use the same topic.
+        It stays advertised: the robot's brake may use the same topic. The link advertises it anew
+        after a loss; the robot, which may be started anew as well, has to notice again.
         """
         connection = self._inquiry.connection
         connection.advertise(topic, type_name=type_name)
-        if (topic, type_name) not in self._advertised:
+        connected_s = anyio.current_time() - (connection.connected_for_s or 0.0)
+        if self._known_s.get((topic, type_name), -math.inf) < connected_s:
             await anyio.sleep(SETTLE_S)
             with suppress(LinkError), anyio.move_on_after(LONGEST_SETTLE_S):
                 while not await connection.fetch_publishers(topic):  # noqa: ASYNC110 - elsewhere
                     await anyio.sleep(LOOK_S)
-            self._advertised.add((topic, type_name))
+            self._known_s[topic, type_name] = anyio.current_time()
 
     async def publish(self, wanted: PublishRun) -> str:
         """Publish, and say how much was sent and how it ended.
