@@ -19,6 +19,7 @@ def measure() -> Iterator[Figure]:
     runs = [_talk() for _ in range(N_RUNS)]
     for name, unit in (
         ("initialize answered after start", "ms"),
+        ("CPU until then", "ms"),
         ("first look_at_map", "ms"),
         ("second look_at_map", "ms"),
         ("get_robot_pose", "ms"),
@@ -34,6 +35,7 @@ def _talk() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         server = ServerProcess("--semantic-map", str(Path(folder) / "semantic_map.yaml"))
         figures = {"initialize answered after start": server.begin()}
+        figures["CPU until then"] = server.cpu_s() * 1e3
         listed, _ = server.ask("tools/list", {})
         figures["tool list"] = len(json.dumps(listed, separators=(",", ":")))
         looked, figures["first look_at_map"] = server.call("look_at_map")

@@ -6,6 +6,7 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -116,6 +117,26 @@ def test_the_tests_need_more_packages_than_the_product(desk: Desk) -> None:
     assert desk.calls_of_uv() == FILLED
     assert desk.run("python")[0] == 0
     assert desk.calls_of_uv() == []
+
+
+def test_what_a_start_loads_is_compiled_when_the_environment_is_made(tmp_path: Path) -> None:
+    script = (CHECKOUT / "run").read_text()
+    function = re.search(r"^write_byte_code\(\) \{.*?^\}", script, re.MULTILINE | re.DOTALL)
+    assert function is not None
+    subprocess.run(  # noqa: S603 - our own script
+        ["/bin/sh", "-euc", f"{function[0]}\nwrite_byte_code"],
+        env={
+            "PATH": os.environ["PATH"],
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "PYTHONPYCACHEPREFIX": str(tmp_path / "compiled"),
+            "python": sys.executable,
+            "venv": str(tmp_path),
+        },
+        check=True,
+    )
+    compiled = {file.name.partition(".")[0] for file in tmp_path.rglob("*.pyc")}
+    assert compiled >= {"transport", "board", "simulation", "func_metadata", "console"}
+    assert [file.name for file in tmp_path.iterdir()] == ["compiled"]
 
 
 def test_an_interrupted_installation_is_done_again_from_the_start(desk: Desk) -> None:
