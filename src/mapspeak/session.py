@@ -350,7 +350,6 @@ class Session:
                     tasks.start_soon(self._again_and_again, self._guarded.watch, LOOK_S)
                     tasks.start_soon(self._again_and_again, self._guarded.watch_map, LOOK_S)
                 tasks.start_soon(self._again_and_again, self._watch, WATCH_S)
-                tasks.start_soon(self.warm_memory)
 
     @contextmanager
     def _announced(self) -> Generator[None]:

@@ -1,5 +1,7 @@
 """`mapspeak skills`: an owner checks, lists and tries what is written in skills.yaml."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -66,3 +68,21 @@ def test_what_a_robot_does_not_offer_is_told_and_leads_to_no_tool_of_a_model(
     assert "skill_status" not in tried.output
     assert "S1 (greet): failed" in tried.output
     assert tried.exit_code == 1
+
+
+def test_trying_a_skill_loads_no_memory_of_what_was_seen(skills: Path) -> None:
+    end = "atexit.register(lambda: print('onnxruntime' in sys.modules))"  # after all threads
+    command = ["skills", "try", str(skills), "say", "words=hello", "--robot", "sim:flat_1"]
+    told = subprocess.run(  # noqa: S603 - our own program
+        [
+            sys.executable,
+            "-c",
+            f"import atexit, sys; {end}; from mapspeak.cli import cli; cli({command})",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "S1 (say): succeeded" in told.stdout
+    assert told.stdout.splitlines()[-1] == "False"

@@ -295,6 +295,7 @@ async def _open_all(
         page=make_page(feeds, options.view, tells_token=options.http is not None),
         work=(
             *(session.keep_watch for session in sessions.values()),
+            *(session.warm_memory for session in sessions.values()),
             *(server.keep_skills for server in servers.values()),
             *drawers,
         ),

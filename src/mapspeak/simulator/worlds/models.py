@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 Colour = tuple[int, int, int]
 """Red, green and blue, 0 to 255, as in a picture (sRGB)."""
 Vector = Sequence[float]
+_Triangles = tuple[FloatArray, FloatArray, FloatArray]
+"""Corners, normals and uv of faces of as many triangles each: (faces, triangles, 3, 3 or 2)."""
 
 
 class Surface(StrEnum):
@@ -175,6 +177,9 @@ def _build_part(
 
 # --- shapes ----------------------------------------------------------------------------------
 
+_BOX_FACES = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7), (3, 2, 1, 0))
+"""The corners of each face of a box, of which the lower four come first."""
+
 
 def _box(
     *, low: Vector, high: Vector, colour: Vector, surface: str | None = None, taper: float = 1.0
@@ -185,8 +190,7 @@ def _box(
     outline = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
     base = np.column_stack([outline, np.full(4, z0)])
     top = np.column_stack([(outline - centre) * taper + centre, np.full(4, z1)])
-    sides = [np.array([base[i], base[i - 3], top[i - 3], top[i]]) for i in range(4)]
-    return _from_faces([*sides, top, base[::-1]], colour, surface)
+    return _from_faces([np.concatenate([base, top])[list(_BOX_FACES)]], colour, surface)
 
 
 def _prism(*, outline_xz: Sequence[Vector], y_low: float, y_high: float, colour: Vector) -> Mesh:
@@ -195,15 +199,15 @@ def _prism(*, outline_xz: Sequence[Vector], y_low: float, y_high: float, colour:
     right = np.column_stack([xz[:, 0], np.full(len(xz), y_low), xz[:, 1]])
     left = np.column_stack([xz[:, 0], np.full(len(xz), y_high), xz[:, 1]])
     n = len(xz)
-    sides = [np.array([right[i], left[i], left[(i + 1) % n], right[(i + 1) % n]]) for i in range(n)]
-    return _from_faces([right, left[::-1], *sides], colour)
+    sides = [[right[i], left[i], left[(i + 1) % n], right[(i + 1) % n]] for i in range(n)]
+    return _from_faces([np.array([right, left[::-1]]), np.array(sides)], colour)
 
 
 def _sheet(*, upper_left: Vector, right: Vector, down: Vector, surface: str) -> Mesh:
     """Return a flat drawn surface, seen from the side where `right` points to the right."""
     origin, r, d = (np.array(vector, dtype=float) for vector in (upper_left, right, down))
-    face = np.array([origin + d, origin + d + r, origin + r, origin])
-    return replace(_from_faces([face], (255, 255, 255), surface), is_solid=False)
+    faces = np.array([[origin + d, origin + d + r, origin + r, origin]])
+    return replace(_from_faces([faces], (255, 255, 255), surface), is_solid=False)
 
 
 def _rod(*, start: Vector, end: Vector, radius_m: float, colour: Vector, n_sides: int = 12) -> Mesh:
@@ -235,7 +239,7 @@ def _lathe(
     A surface is wrapped around it once; its left edge meets its right edge at the back.
     """
     angles = np.linspace(-np.pi, np.pi, n_sides + 1)
-    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    circle = np.column_stack([np.cos(angles), np.sin(angles), np.linspace(0.0, 1.0, n_sides + 1)])
     z_low, z_high = profile[0][1], profile[-1][1]
     span = max(z_high - z_low, 1e-9)
     pieces = [_band(lower, upper, circle, z_high, span) for lower, upper in pairwise(profile)]
@@ -283,59 +287,62 @@ def _frame_along(axis: FloatArray) -> FloatArray:
 
 def _band(
     lower: Vector, upper: Vector, circle: FloatArray, z_high: float, span: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return corners, normals and uv of the ring between two points of a profile."""
+) -> _Triangles:
+    """Return the ring between two points of a profile as one face."""
     (r0, z0), (r1, z1) = lower, upper
-    n = len(circle) - 1
-    rings = [
-        np.column_stack([circle * radius, np.full(n + 1, z)]) for radius, z in ((r0, z0), (r1, z1))
-    ]
-    slope = np.hypot(z1 - z0, r1 - r0) or 1.0
-    outward = np.column_stack([circle * (z1 - z0), np.full(n + 1, r0 - r1)]) / slope
-    u = np.linspace(0.0, 1.0, n + 1)
-    lower_uv, upper_uv = (
-        np.column_stack([u, np.full(n + 1, (z_high - z) / span)]) for z in (z0, z1)
+    rings = np.empty((2, len(circle), 8))
+    for ring, (radius, z) in zip(rings, (lower, upper), strict=True):
+        ring[:, :2] = circle[:, :2] * radius
+        ring[:, 2] = z
+        ring[:, 3:5] = circle[:, :2] * (z1 - z0)
+        ring[:, 5] = r0 - r1
+        ring[:, 6] = circle[:, 2]
+        ring[:, 7] = (z_high - z) / span
+    rings[..., 3:6] /= np.hypot(z1 - z0, r1 - r0) or 1.0
+    low, high = rings
+    first = np.stack([low[:-1], low[1:], high[1:]], axis=1)
+    second = np.stack([low[:-1], high[1:], high[:-1]], axis=1)
+    both = (second,) if r0 == 0.0 else (first,) if r1 == 0.0 else (first, second)
+    corners, normals, uv = np.split(np.concatenate(both)[None], (3, 6), axis=3)
+    return corners, normals, uv
+
+
+def _from_faces(groups: Sequence[FloatArray], colour: Vector, surface: str | None = None) -> Mesh:
+    """Return flat convex faces as triangles; a four-cornered face carries the whole surface.
+
+    Args:
+        groups: Faces of as many corners each, of shape (faces, corners, 3).
+    """
+    return _join([_fan(faces) for faces in groups], colour, surface)
+
+
+def _fan(faces: FloatArray) -> _Triangles:
+    n = faces.shape[1]
+    order = [(0, i, i + 1) for i in range(1, n - 1)]
+    corners = faces[:, order]
+    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    normals /= np.sqrt(np.vecdot(normals, normals))[:, None]
+    uv = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]] if n == 4 else np.zeros((n, 2)))
+    return (
+        corners,
+        np.broadcast_to(normals[:, None, None], corners.shape),
+        np.broadcast_to(uv[order], (*corners.shape[:3], 2)),
     )
 
-    def triangles(low: FloatArray, high: FloatArray) -> FloatArray:
-        first = np.stack([low[:-1], low[1:], high[1:]], axis=1)
-        second = np.stack([low[:-1], high[1:], high[:-1]], axis=1)
-        if r0 == 0.0:
-            return second
-        return first if r1 == 0.0 else np.concatenate([first, second])
 
-    return triangles(*rings), triangles(outward, outward), triangles(lower_uv, upper_uv)
-
-
-def _from_faces(faces: Sequence[FloatArray], colour: Vector, surface: str | None = None) -> Mesh:
-    """Return flat convex faces as triangles; a four-cornered face carries the whole surface."""
-    return _join([_fan(face) for face in faces], colour, surface)
-
-
-def _fan(face: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    n = len(face)
-    order = np.array([[0, i, i + 1] for i in range(1, n - 1)])
-    normal = np.cross(face[1] - face[0], face[2] - face[0])
-    normal /= np.linalg.norm(normal)
-    uv = np.zeros((n, 2))
-    if n == 4:
-        uv = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
-    return face[order], np.broadcast_to(normal, (len(order), 3, 3)).copy(), uv[order]
-
-
-def _join(
-    faces: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
-    colour: Vector,
-    surface: str | None,
-) -> Mesh:
-    """Return a part of faces, each with its corners, normals and uv."""
-    corners, normals, uv = (np.concatenate(arrays) for arrays in zip(*faces, strict=True))
+def _join(pieces: Sequence[_Triangles], colour: Vector, surface: str | None) -> Mesh:
+    """Return a part of groups of faces."""
+    corners, normals, uv = (
+        np.concatenate([each.reshape(-1, *each.shape[2:]) for each in arrays])
+        for arrays in zip(*pieces, strict=True)
+    )
+    n_triangles = np.concatenate([np.full(*piece[0].shape[:2]) for piece in pieces])
     red, green, blue = (int(value) for value in colour)
     return Mesh(
         corners=corners,
         normals=normals,
         uv=uv,
-        faces=np.repeat(np.arange(len(faces)), [len(face[0]) for face in faces]),
+        faces=np.repeat(np.arange(len(n_triangles)), n_triangles),
         colour=(red, green, blue),
         surface=None if surface is None else Surface(surface),
     )
