@@ -310,7 +310,11 @@ async def test_the_robots_map_is_written_when_a_signal_ends_the_server(
 
 
 @pytest.mark.anyio
-async def test_a_client_that_ends_before_its_answer_is_no_fault(tmp_path: Path) -> None:
+@pytest.mark.parametrize("hangs_up", [True, False])
+async def test_a_client_that_takes_no_more_answers_ends_the_server_without_a_fault(
+    tmp_path: Path,
+    hangs_up: bool,  # noqa: FBT001 - a case
+) -> None:
     command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"]
     reading, writing = os.pipe()
     with anyio.fail_after(PATIENCE_S):
@@ -322,7 +326,8 @@ async def test_a_client_that_ends_before_its_answer_is_no_fault(tmp_path: Path) 
             assert process.stdin is not None
             assert process.stderr is not None
             await process.stdin.send(initialize_line())
-            await process.stdin.aclose()
+            if hangs_up:
+                await process.stdin.aclose()
             said = b"".join([part async for part in process.stderr])
             await process.wait()
     assert not said

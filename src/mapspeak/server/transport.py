@@ -6,6 +6,7 @@ import sys
 from collections.abc import AsyncIterable, Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
+from io import TextIOWrapper
 
 import anyio
 import uvicorn
@@ -40,18 +41,29 @@ HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
     """Serve one client over standard input and output until it hangs up.
 
-    A line that is no message is answered, where the SDK keeps silent. A client that ends while an
-    answer is on its way has hung up too.
+    A line that is no message is answered, where the SDK keeps silent. A client that takes no more
+    answers has hung up too, though a thread may wait for its next line for ever.
     """
     lowlevel = server._lowlevel_server  # noqa: SLF001 - what `run_stdio_async` runs
+    assert isinstance(sys.stdin, TextIOWrapper)  # noqa: S101 - a process's own
+    sys.stdin.reconfigure(encoding="utf-8", errors="replace")
+    lines = _Lines(sys.stdin)
     try:
-        async with stdio_server() as (received, to_send), anyio.create_task_group() as tasks:
+        async with stdio_server(lines) as (received, to_send), anyio.create_task_group() as tasks:
             forward, messages = anyio.create_memory_object_stream[SessionMessage | Exception](0)
             tasks.start_soon(_answer_unreadable, received, forward, to_send.send)
             await lowlevel.run(messages, to_send, lowlevel.create_initialization_options())
             tasks.cancel_scope.cancel()
     except* BrokenPipeError:
         _drop_output()
+
+
+class _Lines(anyio.AsyncFile[str]):
+    """A file for whose next line the end does not wait, where the SDK's own does."""
+
+    async def readline(self) -> str:
+        """Return the next line; empty at the end of the file."""
+        return await anyio.to_thread.run_sync(self.wrapped.readline, abandon_on_cancel=True)
 
 
 def _drop_output() -> None:
