@@ -1,16 +1,19 @@
 """Where to stop for pictures: each spot shows what it can once."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from drawing import grid_from_text
 from mapspeak.driving.exploration.camera import find_camera_target
+from mapspeak.driving.exploration.trips import Target
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.fieldofview import CameraView
+from mapspeak.spatial.frontiers import Frontier
 from mapspeak.worldmodel.model import WorldModel
 
 HALF_VIEW_RAD = math.radians(42.5)
@@ -73,3 +76,37 @@ def test_what_lies_behind_is_looked_at_before_the_robot_goes_on_where_that_is_th
     target = find_camera_target(world, views, frontiers, is_closed=lambda _: False)
     # Without a stop, too, the frontiers come first.
     assert (target is not None and target.frontier is None) is is_niche_first
+
+
+CORNERS_UNSEEN = """
+    ###################
+    #.................#
+    #.................#
+    #.................#
+    #.................#
+    #.................#
+    #?????.......?????#
+    #?????.......?????#
+    #######.....#######
+    #.................#
+    #.................#
+    #.................#
+    #.................#
+    ###################
+"""
+
+
+def test_a_corner_in_which_nobody_has_looked_is_worth_a_picture_where_no_frontier_leads_there() -> (
+    None
+):
+    grid = grid_from_text(CORNERS_UNSEEN, resolution_m=0.2)
+    views = [CameraView(Pose(x, 0.5, 0.0), math.pi) for x in (0.5, 1.3, 1.9, 2.5, 3.3)]
+    world = WorldModel(grid, views[0].pose, SemanticMap(), radius_m=0.15)
+
+    def find(frontiers: Sequence[Frontier]) -> Target | None:
+        return find_camera_target(world, views, frontiers, is_closed=lambda _: False)
+
+    target = find(())
+    assert target is not None
+    assert target.pose.y > 1.4
+    assert find(world.frontiers.frontiers) is None

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
+import cv2
 import numpy as np
 
 from mapspeak.driving.drive import OnProgress
@@ -36,7 +37,7 @@ from mapspeak.spatial.fieldofview import (
     sum_by_heading,
 )
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.grid import FloatArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths.rounds import find_shortest_rounds, find_ways_between
 from mapspeak.worldmodel.model import WorldModel
 
@@ -56,6 +57,7 @@ TURN_S = 10.0
 MOST_DRIVES = 4
 """To the goal, to where it fits after more of it is mapped, and the turn."""
 SCOPE_S = 600.0
+OCCUPIED = np.int8(100)
 EXPLORING_LOOK = "a look while exploring,"
 
 
@@ -78,7 +80,8 @@ def find_camera_target(
     """Find the pose to take the next picture in, or the frontier on the way there.
 
     First comes what can be seen by a turn in place. Then the robot takes the shortest way past the
-    frontiers and the stops that show what is left, so that it need not come back.
+    frontiers and the stops that show what is left, so that it need not come back. Unknown floor
+    that no frontier leads to counts as wall: what it hides is shown by no drive to a frontier.
 
     Args:
         views: The pictures so far, the latest last.
@@ -88,30 +91,44 @@ def find_camera_target(
     Returns:
         None where no stop is left, whatever frontiers are.
     """
-    shown = mask_pictured(world.grid, views)
+    grid = _wall_off_unknown(world.grid, frontiers)
+    shown = mask_pictured(grid, views)
     half_rad = find_half_view_rad(views)
     here = world.robot.point
 
     def can_be(target: Target) -> bool:
         return not is_closed(target.pose.point) and not _is_taken(target.pose, views)
 
-    walls = find_walls_by_heading(world.grid, np.array([[here.x, here.y]]))
+    walls = find_walls_by_heading(grid, np.array([[here.x, here.y]]))
     around_m = walls.measure_new(shown)[0]
     if sum_by_heading(around_m, half_rad).max() >= TURN_WORTH_M:
         target = _target(here, around_m, half_rad)
         if can_be(target):
             return target
-    stops = list(_cover_walls(world, shown, half_rad, can_be))
+    stops = list(_cover_walls(world, grid, shown, half_rad, can_be))
     beside = [Target(id=each.id, pose=each.pose, frontier=each) for each in frontiers]
     return _choose_first(world, [*stops, *beside]) if stops else None
 
 
+def _wall_off_unknown(grid: OccupancyGrid, frontiers: Sequence[Frontier]) -> OccupancyGrid:
+    """Return the map with wall for the unknown but at frontiers."""
+    at_frontiers = np.zeros(grid.cells.shape, dtype=np.uint8)
+    for frontier in frontiers:
+        at_frontiers[grid.cells_at(frontier.points)] = 1
+    is_left = cv2.dilate(at_frontiers, np.ones((5, 5), np.uint8)) == 0
+    return replace(grid, cells=np.where(grid.unknown & is_left, OCCUPIED, grid.cells))
+
+
 def _cover_walls(
-    world: WorldModel, shown: Mask, half_rad: float, can_be: Callable[[Target], bool]
+    world: WorldModel,
+    grid: OccupancyGrid,
+    shown: Mask,
+    half_rad: float,
+    can_be: Callable[[Target], bool],
 ) -> Iterator[Target]:
     """Return stops that show all the wall worth a drive: greedily, who shows most first."""
     points, _ = spread_places(world)
-    walls = find_walls_by_heading(world.grid, points)
+    walls = find_walls_by_heading(grid, points)
     is_left = np.ones(len(points), dtype=np.bool_)
     while True:
         new_m = walls.measure_new(shown)
@@ -124,7 +141,7 @@ def _cover_walls(
         if can_be(target):
             yield target
             all_around = CameraView(target.pose, half_view_rad=math.pi)
-            shown = shown | mask_pictured(world.grid, [all_around])
+            shown = shown | mask_pictured(grid, [all_around])
 
 
 def _choose_first(world: WorldModel, goals: Sequence[Target]) -> Target:
