@@ -15,9 +15,10 @@ from mapspeak.memory import SemanticMap
 from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.things.approach import (
     LARGEST_OFF_M,
-    find_approach,
+    Stands,
     find_fronts,
     find_least_path_m,
+    find_stands,
     measure_faced,
 )
 from mapspeak.robot import PoseDoubt
@@ -89,7 +90,7 @@ class Reach:
         standing: Where it would stand in each region, by the region's id.
         out_of_reach: The same for regions it cannot get to.
         frontiers: By the places from which it has looked already.
-        approaches: Where it would stand before a remembered thing, by what else is near that.
+        stands: Where it may stand before a remembered thing, by what else is near that.
         overlooks: From where it would look for one that is not known well enough.
         faced: The share of where a thing may be that it would face there, by the pose.
         fronts: The last floor before a thing, for each who saw it.
@@ -102,7 +103,7 @@ class Reach:
     standing: dict[str, Point | None] = field(default_factory=dict)
     out_of_reach: dict[str, Point] = field(default_factory=dict)
     frontiers: dict[Tried, FrontierReport] = field(default_factory=dict)
-    approaches: ThingMap[dict[bytes, Pose | None]] = field(default_factory=WeakKeyDictionary)
+    stands: ThingMap[dict[bytes, Stands]] = field(default_factory=WeakKeyDictionary)
     overlooks: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
     faced: ThingMap[dict[Pose, float]] = field(default_factory=WeakKeyDictionary)
     fronts: ThingMap[list[Point]] = field(default_factory=WeakKeyDictionary)
@@ -279,10 +280,10 @@ class WorldModel:
         if (position := thing.position) is None:
             return None
         others = self.recollection.find_around(position, LARGEST_OFF_M)
-        return _keep(
-            self.reach.approaches.setdefault(remembered, {}),
+        stands = _keep(
+            self.reach.stands.setdefault(remembered, {}),
             others.tobytes(),
-            lambda: find_approach(
+            lambda: find_stands(
                 self.recollection.found.sight,
                 self.distances,
                 position,
@@ -292,6 +293,7 @@ class WorldModel:
                 others=others,
             ),
         )
+        return stands.choose(self.distances)
 
     def find_least_path_m(self, remembered: RememberedThing) -> float:
         """Return metres than which no way to look at a thing is shorter."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, merge_waypoint
-from mapspeak.memory.things.approach import find_approach
+from mapspeak.memory.things.approach import find_stands
 from mapspeak.memory.things.finding import find_things
 from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.sight import build_sight_map
@@ -494,7 +494,7 @@ def test_one_stands_on_the_side_from_which_a_thing_was_seen_and_faces_it() -> No
     sight = build_sight_map(grid)
     on_wall = Point(3.1, 1.9)
     for viewer, is_west in ((Point(1.0, 1.5), True), (Point(5.0, 1.5), False)):
-        pose = find_approach(sight, distances, on_wall, [viewer])
+        pose = find_stands(sight, distances, on_wall, [viewer]).choose(distances)
         assert pose is not None
         assert (pose.x < 3.0) is is_west
         assert pose.point.distance_to(on_wall) <= 1.5
@@ -507,7 +507,9 @@ def test_nobody_is_sent_to_where_the_robot_cannot_get_to() -> None:
     closed = OccupancyGrid(cells=cells.astype(np.int8), resolution_m=CELL_M)
     distances = distances_from(closed, Point(1.0, 1.0), radius_m=0.2)
     target, viewer = Point(6.0, 1.5), Point(4.5, 1.5)
-    assert find_approach(build_sight_map(closed), distances, target, [viewer]) is None
+    assert (
+        find_stands(build_sight_map(closed), distances, target, [viewer]).choose(distances) is None
+    )
 
 
 def test_views_of_one_place_from_two_poses_meet_as_those_of_two_places_do() -> None:

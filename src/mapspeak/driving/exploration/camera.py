@@ -43,7 +43,7 @@ from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
-DRIVE_WORTH_M = 0.7
+DRIVE_WORTH_M = 1.0
 """So much new wall all around a place is worth a drive there."""
 MOST_ORDERED = 9
 """What is farther off does not come first, and all orders of these are looked at."""

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, bearing_index
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.frontiers.viewpoints import NARROW_COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
@@ -27,8 +29,9 @@ HIDDEN_M = 3.0
 """Another known thing that stands before it is worth so many metres."""
 OTHER_M = 0.3
 """Sight that passes another thing nearer than this may end at it."""
-N_FINALISTS = 16
-"""Lines of sight cost most, so that only so many of the best standing places are asked for them."""
+N_SIDES, N_FINALISTS = 8, 16
+"""Lines of sight cost most, so that only so many of the best standing places are asked for them, as
+many on each side of a thing: what hides it on one may not on another."""
 LOOK_AGAIN_M = 1.5
 """A thing that is known no better is looked for again on arrival."""
 OVERLOOK_M = 2.5
@@ -36,7 +39,7 @@ OVERLOOK_M = 2.5
 known no better than this: before, a drive to it itself faces it more often, 36 times in 48 against
 22 (drawn buildings)."""
 OVERLOOK_FAR_M = 6.0
-OVERLOOK_PATH_WEIGHT = 0.1
+PATH_WEIGHT = 0.1
 """So much of a metre nearer to it is worth a metre of way."""
 ASIDE_M, WELL_ASIDE_RAD = 4.0, math.radians(12)
 """Directions to where a thing may be that spread so far are worth so many metres."""
@@ -45,7 +48,30 @@ BEFORE_M = 0.2
 _STEP_BACK_M = 0.1
 
 
-def find_approach(
+@dataclass(frozen=True, slots=True, eq=False)
+class Stands:
+    """Where a robot may stand to face a thing from near, and what speaks against each place.
+
+    Attributes:
+        target: The middle of the thing.
+        points: Shape (n, 2).
+        costs_m: Shape (n,).
+    """
+
+    target: Point
+    points: FloatArray
+    costs_m: FloatArray
+
+    def choose(self, distances: DistanceField) -> Pose | None:
+        """Return the best pose for a robot that drives there; None where it can stand nowhere."""
+        if not len(self.points):
+            return None
+        ways_m = distances.distances_at(*distances.grid.cells_at(self.points))
+        place = Point(*self.points[int(np.argmin(self.costs_m + PATH_WEIGHT * ways_m))].tolist())
+        return Pose(place.x, place.y, place.bearing_to(self.target))
+
+
+def find_stands(
     sight: SightMap,
     distances: DistanceField,
     target: Point,
@@ -54,35 +80,48 @@ def find_approach(
     fronts: Sequence[Point] | None = None,
     whereabouts: FloatArray | None = None,
     others: FloatArray | None = None,
-) -> Pose | None:
-    """Find a pose that the robot can drive to and that faces a thing from near.
+) -> Stands:
+    """Find where a robot can stand within 1.4 m of a thing in sight of it.
 
     A thing on a wall has floor on both sides of it; the right one is that from which it was seen.
-    Of all places on that side the best one faces most of where the thing may be.
 
     Args:
+        distances: From any place of the same floor.
         fronts: What `find_fronts` gives for these, where it is at hand.
-        whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.
+        whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely; the
+            best place faces most of them.
         others: Where things are near it, itself too, shape (n, 2): the map may not show these.
-
-    Returns:
-        None where the robot cannot get to within 1.4 m in sight of it.
     """
     points, clear_m = _reachable_near(sight, distances, target)
     fronts = find_fronts(sight, target, seen_from) if fronts is None else fronts
     is_seen = _are_in_sight(sight, fronts, points)
-    points, clear_m = points[is_seen], clear_m[is_seen]
-    if not len(points):
-        return None
+    is_roomy = is_seen & (clear_m >= distances.radius_m + NARROW_COMFORT_M)
+    kept = is_roomy if is_roomy.any() else is_seen
+    points, clear_m = points[kept], clear_m[kept]
     off_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
     tight_m = np.maximum(distances.radius_m + COMFORT_M - clear_m, 0.0)
     costs = np.abs(off_m - BEST_OFF_M) + 2 * tight_m
     if others is not None:
         costs += HIDDEN_M * _are_hidden(points, target, others)
+    yaws = np.arctan2(target.y - points[:, 1], target.x - points[:, 0])
     if whereabouts is not None:
-        _add_missed(costs, sight, points, target, seen_from, whereabouts)
-    place = Point(*points[int(np.argmin(costs))].tolist())
-    return Pose(place.x, place.y, place.bearing_to(target))
+        is_ahead = _have_ahead(points, yaws, whereabouts)
+        costs += MISSED_M * (1 - is_ahead.mean(axis=1))
+    best = _best_of_each_side(costs, yaws)
+    costs = costs[best]
+    if whereabouts is not None:
+        is_seen = _have_in_sight(sight, points[best], seen_from, whereabouts)
+        costs += MISSED_M * (is_ahead[best] & ~is_seen).mean(axis=1)
+    return Stands(target, points[best], costs)
+
+
+def _best_of_each_side(costs: FloatArray, yaws: FloatArray) -> IntArray:
+    """Return the indices of the standing places of least cost, as many on each side of a thing."""
+    sides = np.floor((yaws + math.pi) / (math.tau / N_SIDES)).astype(np.intp) % N_SIDES
+    order = np.lexsort((costs, sides))
+    starts = np.searchsorted(sides[order], np.arange(N_SIDES))
+    rank = np.arange(len(order)) - starts[sides[order]]
+    return np.sort(order[rank < N_FINALISTS // N_SIDES])
 
 
 def find_overlook(
@@ -109,7 +148,7 @@ def find_overlook(
     stands, ways_m, off_m = stands[near], ways_m[near], off_m[near]
     yaws = np.arctan2(middle[1] - stands[:, 1], middle[0] - stands[:, 0])
     is_ahead = _have_ahead(stands, yaws, whereabouts, within_m=OVERLOOK_FAR_M)
-    costs = off_m + OVERLOOK_PATH_WEIGHT * ways_m + MISSED_M * (1 - is_ahead.mean(axis=1))
+    costs = off_m + PATH_WEIGHT * ways_m + MISSED_M * (1 - is_ahead.mean(axis=1))
     # From the side a second direction tells how far away it is.
     bearings = np.arctan2(whereabouts[:, 1] - stands[:, 1:], whereabouts[:, 0] - stands[:, :1])
     aside_rad = np.remainder(bearings - yaws[:, None] + math.pi, math.tau) - math.pi
@@ -125,7 +164,7 @@ def find_overlook(
 def find_least_path_m(
     grid: OccupancyGrid, distances: DistanceField, target: Point, seen_from: Sequence[Point]
 ) -> float:
-    """Return metres than which no way to a thing is shorter; `find_approach` costs more to ask.
+    """Return metres than which no way to a thing is shorter; `find_stands` costs more to ask.
 
     The way ends where one might look at the thing, or at a place that it was seen from. Infinite
     where the robot gets to none of these.
@@ -157,27 +196,6 @@ def _are_hidden(points: FloatArray, target: Point, others: FloatArray) -> Mask:
     aside_m = np.abs(to_others[..., 1] * ways[:, :1] - to_others[..., 0] * ways[:, 1:]) / far_m
     is_before = (along_m > 0) & (along_m < far_m - OTHER_M) & (aside_m < OTHER_M)
     return np.asarray(is_before.any(axis=1))
-
-
-def _add_missed(
-    costs: FloatArray,
-    sight: SightMap,
-    points: FloatArray,
-    target: Point,
-    seen_from: Sequence[Point],
-    whereabouts: FloatArray,
-) -> None:
-    """Add to the costs of standing places what they do not face; of all but the best a part."""
-    yaws = np.arctan2(target.y - points[:, 1], target.x - points[:, 0])
-    is_ahead = _have_ahead(points, yaws, whereabouts)
-    costs += MISSED_M * (1 - is_ahead.mean(axis=1))
-    first = np.argsort(costs, kind="stable")[:N_FINALISTS]
-    is_seen = _have_in_sight(sight, points[first], seen_from, whereabouts)
-    hidden = (is_ahead[first] & ~is_seen).mean(axis=1)
-    rest_m = np.inf if len(first) < len(costs) else 0.0
-    kept = costs[first] + MISSED_M * hidden
-    costs += rest_m
-    costs[first] = kept
 
 
 def _have_ahead(
