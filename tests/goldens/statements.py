@@ -394,13 +394,21 @@ def _check_measure(
     tables = read_tables(text)
     heading, rows = _named(tables, "Ways from")
     start = _point(heading[heading.index("(") :])
+    things = {each.id: each.thing.position for each in world.things}
+    begin = things.get(heading.split()[2])
     for row in rows:
-        end = _point(row["at x, y"])
-        straight_m = math.dist(start, end)
-        yield (
-            f"straight to {row['to']}",
-            abs(_number(row["straight m"]) - straight_m) <= ROUNDING + 0.015,
-        )
+        end = _point(row["stand at x, y"])
+        at = things.get(row["to"])
+        # Of a thing that is meant by words no id is told here.
+        if at is not None or re.fullmatch(r"[RCODFW]\d+|\(.*\)", row["to"]):
+            straight_m = math.dist(
+                start if begin is None else (begin.x, begin.y),
+                end if at is None else (at.x, at.y),
+            )
+            yield (
+                f"straight to {row['to']}",
+                abs(_number(row["straight m"]) - straight_m) <= ROUNDING + 0.015,
+            )
         yield (
             f"path to {row['to']} from {start}: {row['path m']}",
             told.is_way(world, start, end, row["path m"]),

@@ -135,6 +135,7 @@ def test_the_way_between_two_rooms_names_the_door_and_is_no_shorter_than_straigh
     way = find_way(world, find_place(world, "R1"), find_place(world, "R2"))
     assert way.through == ("R1", "D1", "R2")
     assert way.path_m is not None
+    assert way.straight_m is not None
     assert way.path_m >= way.straight_m
 
 

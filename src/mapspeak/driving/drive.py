@@ -22,6 +22,7 @@ from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot
 from mapspeak.safety import WhenBusy, calling, current_caller
+from mapspeak.worldmodel.remembered import RememberedThing
 
 POLL_S = 0.2
 PROGRESS_S = 1.0
@@ -110,6 +111,7 @@ class DriveBook:
         place: str,
         ticket: int,
         purpose: GoalPurpose = GoalPurpose.ARRIVE,
+        thing: RememberedThing | None = None,
         part_of: Drive | None = None,
     ) -> Drive:
         """Send a goal to the robot, or let it wait its turn.
@@ -118,7 +120,6 @@ class DriveBook:
 
         Args:
             ticket: From `preparing`.
-            part_of: The drive that was asked for and that this one ends.
 
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
@@ -139,6 +140,7 @@ class DriveBook:
                 caller=current_caller(),
                 ticket=ticket,
                 purpose=purpose,
+                thing=thing,
                 part_of=part_of,
             )
             is_other = busy is not None and busy.caller.owner != drive.caller.owner
@@ -270,8 +272,6 @@ class DriveBook:
         for drive in self._waiting():
             if owner in (None, drive.caller.owner):
                 self._end(drive, GoalStatus(state=GoalState.CANCELLED, cause=cause))
-
-    # --- inside ---
 
     def _open(self) -> list[Drive]:
         """Return the drives that have not ended, in their order."""

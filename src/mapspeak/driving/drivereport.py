@@ -10,6 +10,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.places.relations.choosing import GoalPurpose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 from mapspeak.safety import NOBODY, Caller
+from mapspeak.worldmodel.remembered import RememberedThing
 
 JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
 FRONTIER = re.compile(r"F\d+")
@@ -26,6 +27,7 @@ class Drive:
         caller: Who asked for it.
         ticket: What it was started with; a stop since then ends also what was to follow it.
         purpose: What the robot comes for.
+        thing: The remembered thing that it goes to see; None for other goals.
         part_of: The drive that was asked for and that this one ends; None for one of its own.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
         ended_s: Robot time when it was heard that the drive had ended; None while it goes on.
@@ -41,6 +43,7 @@ class Drive:
     caller: Caller = NOBODY
     ticket: int = 0
     purpose: GoalPurpose = GoalPurpose.ARRIVE
+    thing: RememberedThing | None = None
     part_of: "Drive | None" = None
     begun_at: Point | None = None
     ended_s: float | None = None

@@ -94,7 +94,11 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
         said.append("nobody noted where it is, so the goal is where it was seen from")
     else:
         said[0] += f" at {say_spot(thing.position)}, good to {thing.uncertainty_m:.1f} m"
-        if find_overlook_of(world, remembered) is None and world.find_approach(remembered) is None:
+        overlook = find_overlook_of(world, remembered)
+        if overlook is not None:
+            off_m = overlook.point.distance_to(thing.position)
+            said.append(f"looked for from {off_m:.1f} m off, where most of that is in view")
+        elif world.find_approach(remembered) is None:
             said.append(
                 f"no floor near it can be reached, so the goal is {_say_goal(world, remembered)}"
             )
@@ -126,12 +130,15 @@ def split_room(world: WorldModel, words: str) -> tuple[str, str | None]:
 
 
 def say_candidates(world: WorldModel, called: Sequence[RememberedThing]) -> str:
-    """Say where some things are, and how far by path."""
+    """Say where some things are, how far, and how far by path to where each is seen."""
     told = []
     for each in called[:MOST_NAMED]:
         rooms = " or ".join(world.rooms_before(each)) or "no room"
         path_m = world.path_m(stand_before(world, each).point)
-        told.append(f"{each.id} in {rooms}, {'no way' if path_m is None else f'{path_m:.1f} m'}")
+        at = each.thing.position
+        off = "" if at is None else f"{world.robot.point.distance_to(at):.1f} m off, "
+        way = "no way" if path_m is None else f"{path_m:.1f} m by path"
+        told.append(f"{each.id} in {rooms}, {off}{way}")
     n_more = len(called) - len(told)
     return ", ".join(told) + (f" and {n_more} more" if n_more else "")
 

@@ -18,8 +18,9 @@ class Way:
     """The way a robot would take from one place to another.
 
     Attributes:
-        end: The point it ends at: in a room, where the robot would stand.
-        straight_m: As the crow flies, between the same two points as the path.
+        end: The point it ends at: in a room and before a thing, where the robot would stand.
+        straight_m: As the crow flies: to and from a thing itself, else between the same points as
+            the path. None for a thing without a position.
         path_m: By path; None where the robot cannot get through.
         through: Ids of the regions and doors on the way, in order, both ends included.
         clearance_m: From the robot's centre to the nearest obstacle, where it is least; None
@@ -29,7 +30,7 @@ class Way:
     start: Place
     goal: Place
     end: Point
-    straight_m: float
+    straight_m: float | None
     path_m: float | None = None
     through: tuple[str, ...] = ()
     clearance_m: float | None = None
@@ -48,8 +49,9 @@ def measure_path(world: WorldModel, start: Place, goal: Place) -> float | None:
 
 def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
     """Find the way between two places; of a room it is the point to stand in that counts."""
-    begin, end = standing_point(world, start), standing_point(world, goal)
-    straight_m = begin.distance_to(end)
+    end = standing_point(world, goal)
+    at, to = find_own_point(world, start), find_own_point(world, goal)
+    straight_m = None if at is None or to is None else at.distance_to(to)
     distances = _distances_from(world, start)
     path = None if distances is None else world.map.find_path_over(distances, end)
     path_m = None if path is None else measure_path(world, start, goal)
@@ -90,6 +92,13 @@ def standing_point(world: WorldModel, place: Place) -> Point:
             return stand_before(world, remembered).point
         case _:
             return place.point
+
+
+def find_own_point(world: WorldModel, place: Place) -> Point | None:
+    """Return where a thing is, None where nobody noted that; of others, where ways end."""
+    if isinstance(place.thing, RememberedThing):
+        return place.thing.thing.position
+    return standing_point(world, place)
 
 
 def _cells_along(world: WorldModel, path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -70,8 +70,6 @@ class GoalPurpose(StrEnum):
     """To see what lies there and beyond: no heading was asked for."""
     LOOK_INSIDE = "look_inside"
     """To see a room: no heading was asked for."""
-    CHECK = "check"
-    """To see whether something remembered is there."""
 
     @property
     def is_for_picture(self) -> bool:
@@ -104,6 +102,11 @@ class CheckedGoal:
         reason = self.place.reason
         is_told = reason and not is_taken_name(self.name)
         return f"{self.name}: {reason}" if is_told else self.name
+
+    @property
+    def thing(self) -> RememberedThing | None:
+        """The remembered thing that is gone to; None for other goals."""
+        return self.place.thing if isinstance(self.place.thing, RememberedThing) else None
 
 
 def choose_goal(
@@ -168,8 +171,6 @@ def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None
 
 
 def _purpose_of(place: Place, yaw_deg: float | None) -> GoalPurpose:
-    if isinstance(place.thing, RememberedThing):
-        return GoalPurpose.CHECK
     if yaw_deg is None and isinstance(place.thing, Region):
         return GoalPurpose.LOOK_INSIDE
     is_to_look = yaw_deg is None and isinstance(place.thing, Frontier)

@@ -8,11 +8,12 @@ from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
 from mapspeak.places.naming import find_elsewhere
-from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
+from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.memory import say_landmarks, say_replaced
@@ -20,7 +21,7 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_places_left
 from mapspeak.server.text.wording import list_some, say_pose, say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
-from mapspeak.server.text.world.notices import say_elsewhere
+from mapspeak.server.text.world.notices import say_elsewhere, say_off
 from mapspeak.worldmodel.remembered import RememberedPlace, number_places
 
 MOST_NAMED = 12
@@ -69,6 +70,7 @@ AT_THING = (
     "Take one look: {look_at} tells whether the thing is in view, and where; "
     "{write_semantic_data} keeps what is seen, with gone for what is not there."
 )
+AT_UNPLACED = "Look for it: {look_around}. {write_semantic_data} keeps where it is."
 STOP_OWED = (
     "NOT STOPPED: the robot could not be told yet and may drive on. It is told as soon as it can "
     "be reached; press its own stop button if it must stand now."
@@ -117,7 +119,7 @@ class DriveAnswer(Report):
             pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
-            reason=say_end(report.status),
+            reason=say_end(report.status) or _say_thing(report),
             next_step=lead(FOREIGN_DRIVE) if foreign_goals else _say_next_step(report),
         )
 
@@ -147,7 +149,16 @@ def _say_next_step(report: DriveReport) -> str:
         return "Navigation says that it arrived, but the pose is uncertain: look before going on."
     if off_m > AT_GOAL_M:
         return f"Navigation says that it arrived, but the robot is {off_m:.2f} m from the goal now."
-    return lead(AT_THING) if report.drive.purpose is GoalPurpose.CHECK else ""
+    thing = report.drive.thing
+    at_it = AT_UNPLACED if thing and thing.thing.position is None else AT_THING
+    return "" if thing is None else lead(at_it)
+
+
+def _say_thing(report: DriveReport) -> str:
+    """Say how far a robot that has arrived is from the thing it came for; else nothing."""
+    is_there = report.status.state is GoalState.ARRIVED and report.pose_doubt is None
+    thing = report.drive.thing
+    return "" if thing is None or not is_there else f"{say_off(report.pose.point, thing)}."
 
 
 class GoalAnswer(Report):
@@ -165,13 +176,14 @@ class GoalAnswer(Report):
     nearest: PoseReport | None = Field(description="the nearest pose that works, if this does not")
 
     @classmethod
-    def of(cls, goal: CheckedGoal, *, room: str | None) -> Self:
-        """Make the report of a goal."""
-        check = goal.check
+    def of(cls, goal: CheckedGoal, *, robot: Point, room: str | None) -> Self:
+        """Make the report of a goal of a robot that stands at a point."""
+        check, thing = goal.check, goal.thing
+        off = "" if thing is None else say_off(robot, thing)
         return cls(
             place=goal.name,
             verdict=check.verdict,
-            reason="; ".join(filter(None, (goal.place.reason, say_check(check)))),
+            reason="; ".join(filter(None, (goal.place.reason, off, say_check(check)))),
             pose=PoseReport.of(goal.pose),
             room=room,
             clearance_m=_clearance_m(check),

@@ -279,17 +279,18 @@ def _find_measured(
 ) -> tuple[Point, str] | None:
     """Return where the robot measured a landmark, and by what; None where it did not.
 
-    It is what was measured along the line to it, of something called so.
+    It is what was measured along the line to it, of something called so; without a direction, of
+    the only thing in the picture that is called so.
 
     Args:
         thing: What was said of it.
-        bearing_rad: Its direction from the pose.
+        bearing_rad: Its direction from the pose; None where that was not said.
         stood: The pose it was seen from.
         picture: The one it was seen in.
     """
-    if picture is None or bearing_rad is None:
+    if picture is None:
         return None
-    reading = _find_reading(thing.label, stood.yaw_rad + bearing_rad, picture)
+    reading = _find_reading(thing.label, stood, bearing_rad, picture)
     if reading is None:
         return None
     ahead = Point(
@@ -303,16 +304,20 @@ def _find_measured(
     return point, reading.source
 
 
-def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> PictureReading | None:
-    """Return what was measured of a thing of that name in a direction of the map frame."""
+def _find_reading(
+    label: str, stood: Pose, bearing_rad: float | None, picture: TakenPicture
+) -> PictureReading | None:
+    """Return what was measured of a thing of that name, in a direction from a pose or in all."""
+    called = [each for each in picture.readings if name_the_same(each.label, label)]
+    if bearing_rad is None:
+        return called[0] if len(called) == 1 else None
+    way_rad = stood.yaw_rad + bearing_rad - picture.pose.yaw_rad
     found = [
         (off_rad, number)
-        for number, reading in enumerate(picture.readings)
-        if name_the_same(reading.label, label)
-        and (off_rad := abs(wrap_angle(picture.pose.yaw_rad + reading.bearing_rad - way_rad)))
-        <= SAME_BEARING_RAD
+        for number, reading in enumerate(called)
+        if (off_rad := abs(wrap_angle(reading.bearing_rad - way_rad))) <= SAME_BEARING_RAD
     ]
-    return picture.readings[min(found)[1]] if found else None
+    return called[min(found)[1]] if found else None
 
 
 def _require_possible(thing: LandmarkInput, picture: TakenPicture | None) -> None:

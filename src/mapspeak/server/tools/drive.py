@@ -119,6 +119,7 @@ class DriveTools:
                     place=goal.title,
                     ticket=ticket,
                     purpose=goal.purpose,
+                    thing=goal.thing,
                 )
         return await self._wait(context, drive.goal_id, wait_s)
 

@@ -91,7 +91,8 @@ class PlaceTools:
 
         def check() -> GoalAnswer:
             goal = check_place(world, find_place(world, place))
-            return GoalAnswer.of(goal, room=world.find_room_id(goal.pose.point))
+            room = world.find_room_id(goal.pose.point)
+            return GoalAnswer.of(goal, robot=world.robot.point, room=room)
 
         return await self._session.compute(check)
 

@@ -11,7 +11,7 @@ from mapspeak.places.naming import Place
 from mapspeak.places.recall.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
-from mapspeak.places.ways import standing_point
+from mapspeak.places.ways import find_own_point
 from mapspeak.robot import CameraPicture
 from mapspeak.server.text.findings import say_conflict, say_finding, say_guess, say_support
 from mapspeak.server.text.offered import lead
@@ -165,16 +165,26 @@ def describe_place(world: WorldModel, place: Place) -> str:
             lines = thing_lines(world, thing)
         case _:
             lines = _spot_lines(world, place)
-    why = [f"{place.name} is {place.reason}."] if place.reason else []
+    is_told = isinstance(place.thing, RememberedThing) and place.name == place.thing.id
+    why = [f"{place.name} is {place.reason}."] if place.reason and not is_told else []
     return "\n".join([*why, *lines, *_way_lines(world, place, goal)])
 
 
 def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[str]:
-    yield f"From the robot: {say_direction(world, standing_point(world, place))}."
+    at, off = find_own_point(world, place), ""
+    if at is not None:
+        yield f"From the robot: {say_direction(world, at)}."
+    if isinstance(place.thing, RememberedThing):
+        off = (
+            "where it was seen from"
+            if at is None
+            else f"{at.distance_to(goal.pose.point):.1f} m from it"
+        )
+        off = f", {off}"
     if goal.check.is_ok:
         way = lead("To go there: {navigate_to} takes {place}.", place=place.name)
         yield " ".join(filter(None, (way, say_check(goal.check))))
-        yield f"The robot would stand at {say_pose(goal.pose)}."
+        yield f"The robot would stand at {say_pose(goal.pose)}{off}."
         return
     yield f"The robot cannot go there: {say_check(goal.check)}"
     if goal.check.nearest is not None:

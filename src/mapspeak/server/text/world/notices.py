@@ -10,6 +10,7 @@ from mapspeak.server.text.wording import say_count, say_pose_doubt, shorten
 from mapspeak.spatial.rooms import Door
 from mapspeak.worldmodel.keepout import ClosedArea, ClosedFloor
 from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.remembered import RememberedThing
 
 ASSUMED_RADIUS = (
     "The robot does not tell its size. A radius of {:.2f} m is assumed: doors and goals may be too "
@@ -68,6 +69,14 @@ def say_area(area: ClosedArea) -> str:
     """Return what a closed area is called; the words of an event are not the operator's: quoted."""
     name = shorten(area.name)
     return tell_place(name) if area.event_id else name
+
+
+def say_off(robot: Point, remembered: RememberedThing) -> str:
+    """Return how far a thing itself is from the robot, by what is remembered."""
+    position = remembered.thing.position
+    if position is None:
+        return f"nobody noted where {remembered.id} is"
+    return f"{remembered.id} is {robot.distance_to(position):.1f} m from the robot"
 
 
 def say_direction(world: WorldModel, point: Point) -> str:

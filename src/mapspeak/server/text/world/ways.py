@@ -24,7 +24,9 @@ from mapspeak.server.text.world.notices import say_obstruction, say_warnings
 from mapspeak.server.text.world.tables import say_sizes
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.remembered import RememberedThing
 
+OF_THINGS = "Straight is to a thing itself, the path to where the robot would stand to see it."
 MOST_LINES = 12
 BORDERS = "borders with the unknown not offered"
 NOTHING = (
@@ -182,15 +184,17 @@ def _way_table(world: WorldModel, start: Place, ends: Sequence[Place]) -> str:
     begin = check_place(world, Place(start.name, Spot(standing_point(world, start))))
     table = build_table(
         f"Ways from {start.name} ({say_point(begin.pose.point)}), nearest first",
-        ("to", "at x, y", "path m", "straight m", "through", "least clearance m"),
+        ("to", "stand at x, y", "path m", "straight m", "through", "least clearance m"),
         nearest_first[:MOST_WAYS],
         lambda end: _way_row(world, find_way(world, start, end)),
         n_all=len(nearest_first),
     )
     is_there = begin.check.is_ok or start.point == world.robot.point
-    said = [] if is_there else [f"No way begins there: {say_check(begin.check)}"]
+    has_things = any(isinstance(each.thing, RememberedThing) for each in (start, *ends))
+    said = [OF_THINGS] if has_things else []
+    said += [] if is_there else [f"No way begins there: {say_check(begin.check)}"]
     if is_there and world.map.areas:
-        said = list(_say_why_closed(world, nearest_first[:MOST_WAYS], lengths_m))
+        said += _say_why_closed(world, nearest_first[:MOST_WAYS], lengths_m)
     return "\n".join([table, *said])
 
 
@@ -209,7 +213,7 @@ def _way_row(world: WorldModel, way: Way) -> Sequence[str]:
         way.goal.name,
         say_point(way.end),
         _say_no_way(world, way.goal) if way.path_m is None else say_path(way.path_m),
-        f"{way.straight_m:.1f}",
+        "-" if way.straight_m is None else f"{way.straight_m:.1f}",
         join_words(way.through, "-"),
         "-" if clear_m is None else f"{clear_m:.2f}",
     )
