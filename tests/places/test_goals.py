@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
-from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal, say_check
-from mapspeak.spatial import OccupancyGrid
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal, say_check, say_instead
+from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import distances_from
 
 FLAT = """
@@ -72,7 +72,7 @@ def test_a_goal_nearer_to_a_wall_than_the_robots_radius_is_too_tight() -> None:
     assert found.verdict is GoalVerdict.TOO_TIGHT
     assert "0.10 m from the nearest obstacle; the robot needs 0.30 m" in say_check(found)
     assert found.nearest is not None
-    assert (found.nearest.x, found.nearest.y) == pytest.approx((0.325, 1.025))
+    assert (found.nearest.x, found.nearest.y) == pytest.approx((0.375, 1.025))
     assert found.nearest.yaw_rad == 0.5
 
 
@@ -82,7 +82,7 @@ def test_a_goal_inside_a_wall_is_refused_with_the_nearest_free_pose() -> None:
     assert (found.nearest.x, found.nearest.y) == pytest.approx((0.75, 2.75))
 
 
-def test_the_nearest_pose_is_found_around_walls_and_not_through_them() -> None:
+def test_the_nearest_pose_is_the_nearest_as_the_crow_flies_with_how_far_it_is() -> None:
     text = """
         ###########
         #....#....#
@@ -96,7 +96,9 @@ def test_the_nearest_pose_is_found_around_walls_and_not_through_them() -> None:
     beyond_the_wall = Pose(4.25, 1.25)
     found = check(beyond_the_wall, text=text)
     assert found.verdict is GoalVerdict.UNREACHABLE
-    assert found.nearest is None
+    assert found.nearest is not None
+    assert (found.nearest.x, found.nearest.y) == pytest.approx((3.75, 0.75))
+    assert "0.7 m off" in say_instead(found)[0]
 
 
 def test_the_nearest_pose_may_lie_beyond_what_nobody_has_seen() -> None:
@@ -129,7 +131,7 @@ def test_in_a_thin_wall_the_side_that_can_be_reached_counts() -> None:
     distances = distances_from(grid, Point(2.5, 1.0), radius_m=0.2)
     found = check_goal(grid, distances, Pose(1.51, 1.025))
     assert found.nearest is not None
-    assert found.nearest.x == pytest.approx(1.775)
+    assert found.nearest.x == pytest.approx(1.825)
 
 
 def test_there_is_no_nearest_pose_where_the_robot_cannot_move_at_all() -> None:
@@ -173,6 +175,79 @@ def test_the_pose_that_is_offered_instead_is_accepted(x: float, y: float) -> Non
     found = check(Pose(x, y))
     if found.nearest is not None:
         assert check(found.nearest).is_ok
+
+
+@st.composite
+def drawn_maps(draw: st.DrawFn) -> tuple[OccupancyGrid, Point]:
+    """A map of any cells, and a robot on free floor."""
+    n_cols, n_rows = draw(st.integers(4, 14)), draw(st.integers(3, 10))
+    cells = draw(
+        st.lists(st.sampled_from("....##?"), min_size=n_cols * n_rows, max_size=n_cols * n_rows)
+    )
+    robot = draw(st.integers(0, n_cols * n_rows - 1))
+    cells[robot] = "."
+    lines = ["".join(cells[first : first + n_cols]) for first in range(0, len(cells), n_cols)]
+    grid = grid_from_text("\n".join(lines), resolution_m=draw(st.sampled_from([0.05, 0.25, 0.5])))
+    row, col = divmod(robot, n_cols)
+    return grid, grid.point_at(Cell(n_rows - 1 - row, col))
+
+
+@given(drawn=drawn_maps(), share_x=st.floats(-0.2, 1.2), share_y=st.floats(-0.2, 1.2))
+@settings(max_examples=150)
+def test_what_is_offered_passes_the_same_check_and_nothing_as_roomy_is_nearer(
+    drawn: tuple[OccupancyGrid, Point], share_x: float, share_y: float
+) -> None:
+    grid, robot = drawn
+    radius_m = 0.8 * grid.resolution_m
+    distances = distances_from(grid, robot, radius_m=radius_m)
+    goal = Pose(share_x * grid.width_m, share_y * grid.height_m)
+    found = check_goal(grid, distances, goal)
+    if found.is_ok:
+        return
+    rows, cols = np.nonzero(grid.free)
+    checks = [
+        check_goal(grid, distances, Pose(x, y)) for x, y in grid.points_at(rows, cols).tolist()
+    ]
+    good = [each for each in checks if each.is_ok]
+    assert (found.nearest is None) == (not good)
+    if found.nearest is None:
+        return
+    offered = check_goal(grid, distances, found.nearest)
+    assert offered.is_ok
+    off_m = found.nearest.point.distance_to(goal.point)
+    for each in good:
+        is_nearer = each.goal.point.distance_to(goal.point) < off_m - 1e-6
+        assert not is_nearer or each.clearance_m < offered.clearance_m
+        assert each.goal.point.distance_to(goal.point) > off_m - 0.5 - 1e-6
+
+
+def test_a_pose_is_offered_where_navigation_has_some_room_to_spare() -> None:
+    cells = np.zeros((60, 60), np.int8)
+    cells[:, 0] = cells[0, :] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    # On the way from the corner a cell has exactly the robot's radius to both walls.
+    distances = distances_from(grid, Point(2.0, 2.0), radius_m=0.3)
+    found = check_goal(grid, distances, Pose(0.025, 1.025))
+    assert found.nearest is not None
+    assert check_goal(grid, distances, found.nearest).clearance_m >= 0.32
+
+
+@pytest.mark.parametrize(
+    ("goal", "verdict"),
+    [
+        (Point(0.975, 0.5), GoalVerdict.OCCUPIED),
+        (Point(0.975, 1.5), GoalVerdict.UNKNOWN),
+    ],
+)
+def test_unseen_space_between_the_faces_of_a_wall_is_in_the_wall(
+    goal: Point, verdict: GoalVerdict
+) -> None:
+    cells = np.zeros((40, 40), np.int8)
+    cells[:, 18:22] = -1
+    cells[:20, 17] = cells[:20, 22] = cells[20:, 17] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    distances = distances_from(grid, Point(0.4, 0.5), radius_m=0.2)
+    assert check_goal(grid, distances, Pose(goal.x, goal.y)).verdict is verdict
 
 
 def test_a_goal_on_the_border_of_two_cells_is_as_clear_as_the_cell_it_is_taken_for() -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from mapspeak.errors import NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
-from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, distances_from
 from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea, ClosedFloor
 
@@ -38,8 +37,8 @@ class GoalCheck:
         radius_m: The robot's, around its centre.
         clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and in the
             unknown.
-        nearest: The nearest pose that would work, by ways from the goal that pass through no wall;
-            None for a good goal, and without such a pose.
+        nearest: The pose nearest to the goal that would work, as the crow flies; None for a good
+            goal, and without such a pose.
         bounds: The corners of the map with the least and the greatest x and y; None if the goal
             is not a valid position.
         areas: The closed areas in the way: the one that the goal is in or too near to, the one
@@ -65,14 +64,19 @@ class GoalCheck:
 
 FARTHEST_M = 1e6
 """No map is that large; larger numbers are typing errors, and overflow cell indices."""
-SEARCH_M = 8.0
-"""How far around a goal another one is looked for first."""
+CLEAR_M = 8.0
+"""How far around a goal an obstacle is looked for at all."""
 TOLD_M = 0.01
 """Poses are told to the centimetre."""
 NEAR_M = 1.0
 """How far around a goal an obstacle is looked for first."""
-WALL_SIDES_M = 0.15
-"""A goal in a wall belongs to the nearer side; to both where they differ by no more than this."""
+THICKEST_M = 0.5
+"""Unseen space between faces no farther apart is the inside of a wall."""
+SPARE_M = 0.02
+"""Navigation plans with a little more than the radius, and refuses a goal that leaves less."""
+TIGHT_OFF_M = 0.5
+"""A pose without that counts as so much farther off."""
+MOST_TRIED = 100
 
 
 def check_goal(
@@ -131,7 +135,7 @@ def _judge(
     cell = grid.cell_at(goal.point)
     if not grid.contains(cell):
         return GoalVerdict.OFF_MAP
-    if grid.is_unknown(cell):
+    if grid.is_unknown(cell) and not is_in_wall(grid, goal.point):
         return GoalVerdict.UNKNOWN
     if not grid.is_free(cell):
         return GoalVerdict.OCCUPIED
@@ -176,72 +180,43 @@ def _find_closing(
 
 
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
-    """Find the reachable cell nearest to the goal by ways that pass through no wall.
-
-    Unknown cells may be floor, so paths may lead through them. A goal that is walled in,
-    such as the inside of a cupboard, gets the nearest cell as the crow flies.
-    """
-    straight: Pose | None = None
-    for reach_m in (SEARCH_M, math.inf):
-        window = _window(grid, goal.point, reach_m)
-        points = _reachable_points(window, distances)
-        if not points.size:
-            continue
-        ways_m = _ways_around_walls(window, goal.point, points)
-        best = int(np.argmin(ways_m))
-        if np.isfinite(ways_m[best]):
-            return Pose(float(points[best, 0]), float(points[best, 1]), goal.yaw_rad)
-        if straight is None and not grid.is_free(grid.cell_at(goal.point)):
-            off_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
-            x, y = points[int(np.argmin(off_m))].tolist()
-            straight = Pose(x, y, goal.yaw_rad)
-    return straight
-
-
-def _reachable_points(window: OccupancyGrid, distances: DistanceField) -> FloatArray:
-    points = window.points_at(*np.nonzero(window.free))
-    if window.resolution_m < 2 * TOLD_M:
+    """Find the pose nearest to a goal, as the crow flies, that passes the same check."""
+    rows, cols = np.nonzero(distances.reachable)
+    points = grid.points_at(rows, cols)
+    if grid.resolution_m < 2 * TOLD_M:
         # What is told of a pose must lie in a cell that works, too.
         points = points.round(2)
-    rows, cols = distances.lattice.grid.cells_at(points)
-    return points[np.isfinite(distances.distances_at(rows, cols))]
-
-
-def _ways_around_walls(window: OccupancyGrid, goal: Point, points: FloatArray) -> FloatArray:
-    """Return the lengths of ways from the goal over free and unseen floor."""
-    floor = OccupancyGrid(
-        cells=np.where(window.occupied & ~_wall_around(window, goal), 100, 0).astype(np.int8),
-        resolution_m=window.resolution_m,
-        origin=window.origin,
+    is_tight = distances.clearances_m[rows, cols] < distances.radius_m + SPARE_M
+    off_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y) + TIGHT_OFF_M * is_tight
+    first = (
+        np.argpartition(off_m, MOST_TRIED)[:MOST_TRIED] if len(off_m) > MOST_TRIED else slice(None)
     )
-    start = _into(window, goal)
-    rows, cols = window.cells_at(points)
-    around_m = distances_from(floor, start, radius_m=0.0).distances_at(rows, cols)
-    straight_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
-    return np.maximum(around_m, straight_m)
+    nearest = points[first][np.argsort(off_m[first], kind="stable")].tolist()
+    poses = (Pose(x, y, goal.yaw_rad) for x, y in nearest)
+    return next((pose for pose in poses if judge_goal(grid, distances, pose).is_ok), None)
 
 
-def _wall_around(window: OccupancyGrid, goal: Point) -> Mask:
-    """Return True around a goal in a wall, as far as to where the wall ends.
-
-    Nowhere for other goals.
-    """
-    inside = window.fractional_cells_at(np.array([[goal.x, goal.y]]))[0]
-    rows, cols = np.indices(window.cells.shape)
-    away_m = np.hypot(rows + 0.5 - inside[0], cols + 0.5 - inside[1]) * window.resolution_m
-    cell = window.cell_at(_into(window, goal))
-    if not window.is_occupied(cell) or window.occupied.all():
-        return np.zeros(window.cells.shape, dtype=np.bool_)
-    return np.asarray(away_m <= away_m[~window.occupied].min() + WALL_SIDES_M, dtype=np.bool_)
-
-
-def _into(grid: OccupancyGrid, point: Point) -> Point:
-    """Return the point itself, or the centre of the nearest cell where it lies off the map."""
+def is_in_wall(grid: OccupancyGrid, point: Point) -> bool:
+    """Return True for unseen space with both faces of a wall near, on opposite sides of it."""
     cell = grid.cell_at(point)
-    if grid.contains(cell):
-        return point
-    row, col = np.clip((cell.row, cell.col), 0, (grid.n_rows - 1, grid.n_cols - 1)).tolist()
-    return grid.point_at(Cell(row, col))
+    if not grid.contains(cell) or not grid.is_unknown(cell):
+        return False
+    return any(
+        _to_face_m(grid, cell, down, across) + _to_face_m(grid, cell, -down, -across) <= THICKEST_M
+        for down, across in ((0, 1), (1, 0), (1, 1), (1, -1))
+    )
+
+
+def _to_face_m(grid: OccupancyGrid, cell: Cell, down: int, across: int) -> float:
+    """Return the metres to an obstacle behind unseen cells in a direction; infinite for none."""
+    step_m = math.hypot(down, across) * grid.resolution_m
+    for n in range(1, int(THICKEST_M / step_m) + 1):
+        at = Cell(cell.row + n * down, cell.col + n * across)
+        if not grid.contains(at) or grid.is_free(at):
+            break
+        if grid.is_occupied(at):
+            return n * step_m
+    return math.inf
 
 
 def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
@@ -250,7 +225,7 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
         return 0.0
     # Most goals have something near, and a small window is looked at in no time.
     near_m = _nearest_obstacle_m(grid, cell, NEAR_M)
-    return near_m if math.isfinite(near_m) else _nearest_obstacle_m(grid, cell, SEARCH_M)
+    return near_m if math.isfinite(near_m) else _nearest_obstacle_m(grid, cell, CLEAR_M)
 
 
 def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> float:
@@ -262,13 +237,6 @@ def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> floa
     off_m = float(off.min(initial=math.inf)) * grid.resolution_m
     # The corners of the square are farther than what lies beyond its sides.
     return off_m if off_m <= reach_m else math.inf
-
-
-def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid:
-    """Return the part of a map around a point, or around the part of the map nearest to it."""
-    cell = grid.cell_at(_into(grid, centre))
-    n = max(grid.n_rows, grid.n_cols) if math.isinf(reach_m) else int(reach_m / grid.resolution_m)
-    return grid.crop(*grid.window(cell.row, cell.col, margin=n))
 
 
 def say_refusal(name: str, check: GoalCheck) -> str:
@@ -287,8 +255,9 @@ def say_instead(check: GoalCheck, *, has_heading: bool = False) -> tuple[str, Ne
     if near is None:
         return "No place near it works either.", NextStep.CHOOSE_ON_MAP
     heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
-    hint = f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}."
-    return hint, NextStep.DRIVE_THERE
+    off_m = near.point.distance_to(check.goal.point)
+    at = f"x={near.x:.2f}, y={near.y:.2f}{heading}, {off_m:.1f} m off"
+    return f"The nearest pose that works is {at}.", NextStep.DRIVE_THERE
 
 
 def say_check(check: GoalCheck) -> str:
@@ -330,7 +299,7 @@ def _say_bounds(check: GoalCheck) -> str:
 
 def _say_clearance(check: GoalCheck) -> str:
     if math.isinf(check.clearance_m):
-        return f"more than {SEARCH_M:.0f} m from any obstacle"
+        return f"more than {CLEAR_M:.0f} m from any obstacle"
     return f"{check.clearance_m:.2f} m from the nearest obstacle"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from mapspeak.memory import Landmark, group_views
 from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
-from mapspeak.places.goalcheck import say_check
+from mapspeak.places.goalcheck import is_in_wall, say_check
 from mapspeak.places.naming import Place
 from mapspeak.places.recall.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
@@ -324,6 +324,8 @@ def _say_ground(world: WorldModel, place: Place) -> str:
     cell = world.grid.cell_at(place.point)
     if not world.grid.contains(cell):
         return "off the map"
+    if is_in_wall(world.grid, place.point):
+        return "in a wall"
     if world.grid.is_unknown(cell):
         return "not seen yet"
     room = world.find_room_id(place.point) or "no room"
