@@ -1,5 +1,7 @@
 """Regions: colours that stay, patterns, the highlight, and labels in the part that is seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -121,6 +123,22 @@ def test_the_colours_of_a_closer_look_are_those_of_the_whole() -> None:
     for point, colour in zip(points, colours, strict=True):
         near = draw_map(THREE_ROOMS, layers=layers, zoom=Zoom(centre=point, radius_m=0.7))
         assert colour_at(near, Point(point.x + 0.3, point.y + 0.3)) == colour
+
+
+def test_a_picture_is_the_same_whatever_was_drawn_of_its_regions_before() -> None:
+    kept = RegionLayer(THREE, keyed(1, 7, 13))
+    opened = replace(THREE_ROOMS, cells=np.where(THREE_ROOMS.cells > 0, 0, THREE_ROOMS.cells))
+    near = Zoom(centre=Point(106.25, 201.25), radius_m=3.0)
+    for grid, robot, zoom in (
+        (THREE_ROOMS, Pose(101.25, 201.25), None),
+        (THREE_ROOMS, Pose(106.25, 202.25), None),
+        (THREE_ROOMS, Pose(106.25, 202.25), near),
+        (opened, Pose(106.25, 202.25), near),
+        (THREE_ROOMS, Pose(101.25, 201.25), None),
+    ):
+        anew = MapLayers(regions=RegionLayer(THREE, keyed(1, 7, 13)), robot=robot)
+        drawn = draw_map(grid, layers=replace(anew, regions=kept), zoom=zoom)
+        assert drawn == draw_map(grid, layers=anew, zoom=zoom)
 
 
 def test_a_map_that_grew_towards_its_origin_keeps_its_colours() -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -14,6 +15,9 @@ from mapspeak.spatial.paths.lattice import Clearance
 from mapspeak.spatial.paths.wavefront import Costs
 from mapspeak.spatial.rooms import CorridorWalk, Region, RoomMap, find_rooms, walk_along
 from mapspeak.worldmodel.keepout import ClosedArea, close_floor, mask_areas
+
+if TYPE_CHECKING:
+    from mapspeak.spatial.picture import PictureRegion, RegionLayer
 
 STEP_M = 0.1
 
@@ -55,6 +59,9 @@ class MapRevision:
         areas: What is closed of the floor: no way leads over it.
         hindrances: What ways lead round where that is not too far.
         leaves_pockets: A robot that a gap too narrow by a cell shuts in gets out of it.
+
+    Attributes:
+        drawn: The rooms as they were drawn last.
     """
 
     def __init__(
@@ -76,6 +83,7 @@ class MapRevision:
         self._earlier_rooms = None if previous is None else previous.latest_rooms
         self._fields: dict[Cell, DistanceField] = {}
         self._walks: dict[str, CorridorWalk | None] = {}
+        self.drawn: dict[tuple[PictureRegion, ...], RegionLayer] = {}
 
     def is_of(self, grid: OccupancyGrid) -> bool:
         """Return True when a map shows the same as this one."""

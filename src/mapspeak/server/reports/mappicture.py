@@ -1,8 +1,8 @@
 """A world model as a picture: rooms, doors, frontiers, places and the robot, under their ids."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -144,7 +144,9 @@ def draw_rooms(rooms: RoomMap) -> WorldPicture:
     """Draw a map with its rooms and doors; no robot needs to be there for it."""
     is_detailed = _scale_px_per_m(rooms.grid, MapLook()) >= DETAIL_PX_PER_M
     layers = MapLayers(
-        regions=_layer(rooms, [_area(region, has_area=is_detailed) for region in rooms.regions]),
+        regions=_layer(
+            rooms, tuple(_area(region, has_area=is_detailed) for region in rooms.regions)
+        ),
         marks=tuple(_door_mark(door) for door in rooms.doors) if is_detailed else (),
         legend=LEGEND,
     )
@@ -166,31 +168,39 @@ def _rooms_in(view: MapView, *, has_areas: bool) -> RegionLayer:
     """Return all regions; only those that are listed have their names written in them."""
     around = view.look.around
     listed = {region.id for region in (*view.rooms.items, *view.corridors.items)}
-    areas = [_area(region, has_area=has_areas) for region in view.world.rooms.regions]
-    return _layer(
-        view.world.rooms,
-        [
-            replace(
-                area,
-                text=area.text if region.id in listed else "",
-                is_highlighted=around is not None and around.thing == region,
-            )
-            for area, region in zip(areas, view.world.rooms.regions, strict=True)
-        ],
+    areas = tuple(
+        _area(
+            region,
+            has_area=has_areas,
+            is_named=region.id in listed,
+            is_highlighted=around is not None and around.thing == region,
+        )
+        for region in view.world.rooms.regions
     )
+    drawn = view.world.map.drawn
+    layer = drawn.get(areas)
+    if layer is None:
+        layer = _layer(view.world.rooms, areas)
+        drawn.clear()
+        drawn[areas] = layer
+    return layer
 
 
-def _layer(rooms: RoomMap, areas: Sequence[Area]) -> RegionLayer:
-    return RegionLayer(rooms.labels.astype(np.uint16), tuple(areas))
+def _layer(rooms: RoomMap, areas: tuple[Area, ...]) -> RegionLayer:
+    return RegionLayer(rooms.labels.astype(np.uint16), areas)
 
 
-def _area(region: Region, *, has_area: bool) -> Area:
+def _area(
+    region: Region, *, has_area: bool, is_named: bool = True, is_highlighted: bool = False
+) -> Area:
+    text = f"{region.id} {region.floor_area_m2:.1f} m2" if has_area else region.id
     return Area(
         label=region.index,
         key=int(region.id[1:]),
-        text=f"{region.id} {region.floor_area_m2:.1f} m2" if has_area else region.id,
+        text=text if is_named else "",
         is_hatched=region.room_class is RoomClass.CORRIDOR,
         is_dotted=region.room_class is RoomClass.OPEN_SPACE,
+        is_highlighted=is_highlighted,
     )
 
 

@@ -2,8 +2,7 @@
 
 import io
 import itertools
-import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +34,8 @@ from mapspeak.spatial.picture.marks import (
     MapLayers,
     Mark,
     PictureRegion,
+    RegionLayer,
+    Sheet,
 )
 from mapspeak.spatial.picture.placing import place_labels
 from mapspeak.spatial.picture.regions import (
@@ -110,24 +111,36 @@ def draw_map(
     view = _plan_sheet(
         grid, extent, everything, up_rad=up_rad, max_edge_px=max_edge_px, steps_per_pixel=2
     )
+    painted = {} if layers.regions is None else layers.regions.painted
+    key = grid, view, spacing_m
+    sheet = painted.get(key)
+    if sheet is None:
+        sheet = _paint_sheet(grid, view, layers.regions, spacing_m)
+        painted.clear()
+        painted[key] = sheet
+    return _finish(sheet, view, layers, legend=replace(legend, grounds=sheet.grounds))
+
+
+def _paint_sheet(
+    grid: OccupancyGrid, view: PictureView, layer: RegionLayer | None, spacing_m: float
+) -> Sheet:
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
     inside[:] = paint_ground(grid, view)
-    if layers.regions is None:
-        regions = _no_regions(view)
-    else:
-        if layers.regions.labels.shape != grid.cells.shape:
+    regions = _no_regions(view)
+    poles: Mapping[int, tuple[float, float]] = {}
+    if layer is not None:
+        if layer.labels.shape != grid.cells.shape:
             raise MapError(
-                f"The regions cover {layers.regions.labels.shape} cells, the map has "
-                f"{grid.cells.shape}.",
+                f"The regions cover {layer.labels.shape} cells, the map has {grid.cells.shape}.",
                 hint="Find the regions of this map again.",
             )
-        regions = sample(layers.regions.labels, grid, view)
-        colours = colour_regions(layers.regions, grid)
-        paint_regions(inside, regions, layers.regions.regions, colours)
-    seen = {number: text for number, text in _GROUNDS.items() if (inside == number).any()}
+        regions = sample(layer.labels, grid, view)
+        paint_regions(inside, regions, layer.regions, colour_regions(layer, grid))
+        poles = find_poles(regions, tuple(region.label for region in layer.regions))
+    grounds = {number: text for number, text in _GROUNDS.items() if (inside == number).any()}
     axes.draw_axes(canvas, view, spacing_m)
-    return _finish(canvas, view, layers, legend=replace(legend, grounds=seen), regions=regions)
+    return Sheet(canvas=canvas, regions=regions, poles=poles, grounds=grounds)
 
 
 def draw_map_plain(grid: OccupancyGrid) -> MapPicture:
@@ -162,7 +175,8 @@ def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers) -> MapPicture:
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     view.area_of(canvas)[:] = paint_paper_ground(grid, view)
     axes.draw_axes(canvas, view, spacing_m)
-    return _finish(canvas, view, layers, legend=legend, regions=_no_regions(view))
+    sheet = Sheet(canvas=canvas, regions=_no_regions(view), poles={}, grounds=_PAPER_GROUNDS)
+    return _finish(sheet, view, layers, legend=legend)
 
 
 def _plan_sheet(
@@ -196,19 +210,12 @@ def _plan_sheet(
         n_rows = n_needed
 
 
-def _finish(
-    canvas: Canvas,
-    view: PictureView,
-    layers: MapLayers,
-    *,
-    legend: Legend,
-    regions: NDArray[np.uint16],
-) -> MapPicture:
-    """Draw zones, lines, symbols, the robot, all labels and the legend; return the picture."""
+def _finish(sheet: Sheet, view: PictureView, layers: MapLayers, *, legend: Legend) -> MapPicture:
+    """Draw zones, lines, symbols, the robot, all labels and the legend on a copy of a sheet."""
+    canvas, regions = sheet.canvas.copy(), sheet.regions
     zones = paint_zones(view.area_of(canvas), view, layers.zones)
     named = _regions_of(layers)
-    poles = find_poles(regions, tuple(r.label for r in named)) if named else {}
-    in_sight = tuple(region for region in named if region.label in poles)
+    in_sight = tuple(region for region in named if region.label in sheet.poles)
     is_marked = view.shows_each(_points_of(layers.marks))
     robot = layers.robot
     shown = replace(
@@ -224,7 +231,7 @@ def _finish(
             for zone, pole in zones.items()
             if zone.label and pole is not None
         ),
-        *labels_of_regions(in_sight, poles),
+        *labels_of_regions(in_sight, sheet.poles),
     ]
     covered = (zone.label for zone, pole in zones.items() if zone.label and pole is None)
     left_out = (*covered, *_draw_symbols(view.area_of(canvas), view, shown, labels, regions))
@@ -240,11 +247,11 @@ def _finish(
 
 
 def _encode(canvas: Canvas) -> bytes:
-    """Return a palette PNG; run lengths alone pack a map well, and in a fraction of the time."""
+    """Return a palette PNG, packed in the least time."""
     picture = Image.fromarray(canvas)
     picture.putpalette(PALETTE.tobytes())
     file = io.BytesIO()
-    picture.save(file, "PNG", compress_level=1, compress_type=zlib.Z_RLE)
+    picture.save(file, "PNG", compress_level=1)
     return file.getvalue()
 
 

@@ -86,19 +86,17 @@ def text_patch(text: str, size_px: int) -> Canvas:
     A tab sets words apart that do not belong together. Patches are kept, and locked, because the
     same numbers and ids are written again and again.
     """
-    gap = np.zeros((_font(size_px)[2], round(_GAP_RATIO * size_px)), dtype=np.uint8)
+    height = _font(size_px)[2]
+    gap = np.zeros((height, round(_GAP_RATIO * size_px)), dtype=np.uint8)
     rows = []
     for line in text.split("\n"):
         first, *others = (_word_patch(word, size_px) for word in line.split("\t"))
         rows.append(np.hstack([first, *(part for other in others for part in (gap, other))]))
     width = max(row.shape[1] for row in rows)
-    lefts = [(width - row.shape[1]) // 2 for row in rows]
-    patch = np.concatenate(
-        [
-            np.pad(row, ((0, 0), (left, width - row.shape[1] - left)))
-            for row, left in zip(rows, lefts, strict=True)
-        ]
-    )
+    patch = np.zeros((height * len(rows), width), dtype=np.uint8)
+    for lines, row in zip(np.split(patch, len(rows)), rows, strict=True):
+        left = (width - row.shape[1]) // 2
+        lines[:, left : left + row.shape[1]] = row
     patch.setflags(write=False)
     return patch
 

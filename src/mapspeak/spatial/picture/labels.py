@@ -4,6 +4,7 @@ Marks in nearly the same place share one label, so that it is clear what it belo
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,7 +113,7 @@ def labels_of_marks(marks: tuple[Mark, ...], places: FloatArray) -> list[Label]:
 
 
 def labels_of_regions(
-    regions: tuple[PictureRegion, ...], poles: dict[int, tuple[float, float]]
+    regions: tuple[PictureRegion, ...], poles: Mapping[int, tuple[float, float]]
 ) -> list[Label]:
     """Return the labels of regions, each at the place with the most room."""
     return [

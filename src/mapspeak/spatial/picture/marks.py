@@ -3,7 +3,8 @@
 Pale fills and marks follow the Okabe-Ito set, which people with any colour vision can tell apart.
 """
 
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -217,16 +218,35 @@ class PictureRegion:
     key: int | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sheet:
+    """What lies below the lines, marks and labels of a picture.
+
+    Attributes:
+        canvas: Ground, regions and axes, in palette numbers.
+        regions: The region of each pixel of the map area; 0 for none.
+        poles: The place (u, v) in it for the name of each region in sight.
+        grounds: The names of the kinds of ground in sight, by palette number.
+    """
+
+    canvas: Canvas
+    regions: NDArray[np.uint16]
+    poles: Mapping[int, tuple[float, float]]
+    grounds: Mapping[int, str]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RegionLayer:
     """Areas that do not overlap, as one array of numbers; compared by identity.
 
     Attributes:
         labels: uint16, the shape of the grid's cells; 0 belongs to no region.
+        painted: The sheet painted last, by the map, the view and the spacing of its lines.
     """
 
     labels: NDArray[np.uint16]
     regions: tuple[PictureRegion, ...]
+    painted: dict[Hashable, Sheet] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         locked = np.array(self.labels, dtype=np.uint16, order="C")

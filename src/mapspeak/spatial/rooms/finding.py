@@ -109,8 +109,10 @@ def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionSh
 
 def _unseen_share(raster: Raster, inside: Mask, window: Window) -> float:
     """Return how much of the outline of a region borders on unseen cells."""
-    region = np.pad(inside.astype(np.uint8), 1)
-    outline = (cv2.dilate(region, np.ones((3, 3), np.uint8)) > 0) & (region == 0)
+    region = cv2.copyMakeBorder(
+        inside.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
+    )
+    outline = cv2.dilate(region, np.ones((3, 3), np.uint8)) > region
     rows, cols = (slice(max(part.start - 1, 0), part.stop + 1) for part in window)
     seen = np.zeros(region.shape, np.uint8)
     part = raster.free[rows, cols] | raster.occupied[rows, cols]

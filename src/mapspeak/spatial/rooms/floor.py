@@ -115,7 +115,7 @@ def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
 
 
 OBLIQUE_STEP_DEG = 7.5
-_SIEVE, _FEW_CELLS = 5, 500
+_SIEVE, _FEW_CELLS = 5, 2000
 """Every so many cells of a line are tried first; then so many cells are looked at one by one."""
 SLENDER_RATIO = 0.37
 """Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
@@ -147,9 +147,11 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
             reach = _line(2 * SETTINGS.wall_reach_m / size_m, turned_deg)
             in_line = np.asarray(cv2.dilate(long_run, reach), np.uint8)
             wall |= long_run | (piece & in_line)
+    any_way = np.zeros_like(occupied)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
-        wall |= _open(thick, SETTINGS.oblique_length_m / size_m, turned_deg) & occupied & large
-    return wall, occupied & large
+        any_way |= _open(thick, SETTINGS.oblique_length_m / size_m, turned_deg)
+    obstacle = occupied & large
+    return wall | (any_way & obstacle), obstacle
 
 
 def _open(picture: Picture, length: float, angle_deg: float) -> Picture:
