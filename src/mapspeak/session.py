@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
-from functools import partial
+from functools import cached_property, partial
 from typing import TypeVar, cast
 
 import anyio
@@ -49,7 +49,8 @@ WATCH_S = 0.5
 """Wall time between two looks at the clients and at how a drive stands."""
 MAP_S = 3.0
 """Wall time for a map to come, where only the name of a room is wanted of it."""
-ANY_EPISODE = EpisodeQuery(words="anything", limit=1)
+QUIET_S = 1.0
+"""Wall time without a call after which the vectors of episodes are made: questions go first."""
 T = TypeVar("T")
 logger = logging.getLogger(__name__)
 
@@ -117,13 +118,11 @@ class Session:
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
         wall_clock = None if guard is None else guard.wall_clock
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
-        self._rank: VectorRank | None = None
         self.recollector = Recollector(find_model, kept=folder)
-        self.drives = DriveBook(self.robot, when_busy=when_busy)
+        self.drives, self._revising = DriveBook(self.robot, when_busy=when_busy), anyio.Lock()
         self.keeper, self._lease = self.memory.keeper, Lease(lease_s)
         self.world: WorldModel | None = None
         self._tries, self._looked_s, self._learned = FrontierTries(), 0.0, set[str]()
-        self._ranking, self._revising = threading.Lock(), anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
         """Mark a client's call: its lease begins anew."""
@@ -229,16 +228,15 @@ class Session:
 
     def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
         """Return the observations that pass a query, compared by meaning where that is possible."""
-        query, find = replace(query, placings=self.memory.place_maps()), self.episodes.store.find
-        compares_words = query.words or isinstance(query.near, EpisodeQuery)
-        embedder = self.recollector.embedder if compares_words else None
-        if embedder is None:
-            return find(query)
-        # One at a time: a rank learns the texts that it has not met.
-        with self._ranking:
-            if self._rank is None:
-                self._rank = VectorRank(self.episodes.store.database, embedder)
-            return find(query, rank=self._rank)
+        rank = self._rank if query.words or isinstance(query.near, EpisodeQuery) else None
+        placed = replace(query, placings=self.memory.place_maps())
+        return self.episodes.store.find(placed, rank=rank)
+
+    @cached_property
+    def _rank(self) -> VectorRank | None:
+        if (embedder := self.recollector.embedder) is None:
+            return None
+        return VectorRank(self.episodes.store.database, embedder, lock=threading.Lock())
 
     def find_reported(self, query: EpisodeQuery) -> EpisodePage:
         """Return the observations that pass a query, compared by words alone."""
@@ -258,16 +256,16 @@ class Session:
                 # Without a map yet, all but the joining is made ready.
                 await in_thread(lambda: self.recollector.warm(self.memory.read()))
                 raise
-            # All of it in the thread: what is remembered is joined with the map there.
             await in_thread(partial(_prepare, world))
             await in_thread(self.recollector.keep_things)
-            if self.recollector.embedder is not None:
-                await in_thread(partial(self.find_episodes, ANY_EPISODE))
+            await self._lease.wait_for_silence(QUIET_S)
+            while self._rank is not None and await in_thread(self._rank.learn_ahead):
+                await self._lease.wait_for_silence(QUIET_S)
 
     async def keep_vectors(self) -> None:
         """Keep the vectors of remembered texts, so that a later session need not make them."""
         if self.episodes.is_open:
-            await self.compute(self.recollector.keep)
+            await self.compute(self.recollector.keep_if_many)
 
     async def meet_map(self) -> None:
         """Find out which frame of the memory the robot's map is in, before a write."""
@@ -391,9 +389,11 @@ class Session:
         with anyio.CancelScope(shield=True):
             if self._is_busy:
                 await self.drives.stop(Cause(code=CauseCode.SERVER_ENDED))
+            if self.episodes.is_open:
+                await self.compute(self.recollector.keep)
 
 
 def _prepare(world: WorldModel) -> None:
-    """Make what the first question would: things, their index, rooms and ways."""
+    """Make what the first question would, in its thread: things, their index, rooms and ways."""
     world.recollection.prepare()
     _ = world.judge

@@ -7,11 +7,13 @@ from pathlib import Path
 import pytest
 
 from drawing import grid_from_text
+from embedding import ConceptEmbedder
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, LaserFan, SemanticMap, Waypoint
+from mapspeak.memory.things.finding import Things
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.keptthings import PlainReader, load_things
-from mapspeak.worldmodel.recollection import KEPT_FROM, THINGS_FILE, Recollector
+from mapspeak.worldmodel.keptvalues import PlainReader, load_value
+from mapspeak.worldmodel.recollection import INDEX_FILE, KEPT_FROM, THINGS_FILE, Recollector
 
 HALL = """
     ####################
@@ -58,7 +60,7 @@ def _keep(folder: Path, memory: SemanticMap) -> Recollector:
 
 def test_a_later_session_takes_the_things_that_were_kept(tmp_path: Path) -> None:
     first = _keep(tmp_path, _remember()).latest
-    kept = load_things(tmp_path / THINGS_FILE)
+    kept = load_value(tmp_path / THINGS_FILE, Things)
 
     later = Recollector(kept=tmp_path)
     again = later.recollect(_remember(), _draw())
@@ -98,12 +100,61 @@ def test_the_things_of_a_small_memory_are_joined_and_not_kept(tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
 
 
+def _prepare(folder: Path, memory: SemanticMap, embedder: ConceptEmbedder) -> Recollector:
+    recollector = Recollector(lambda: embedder, kept=folder)
+    recollector.recollect(memory, _draw()).prepare()
+    recollector.keep_things()
+    recollector.keep()
+    return recollector
+
+
+def test_a_later_session_takes_the_index_that_was_kept(tmp_path: Path) -> None:
+    first = _prepare(tmp_path, _remember(), ConceptEmbedder()).latest
+    assert first is not None
+    written = (tmp_path / INDEX_FILE).stat().st_mtime_ns
+
+    asked = ConceptEmbedder()
+    later = _prepare(tmp_path, _remember(), asked).latest
+
+    assert later is not None
+    assert later.find("somewhere to wash") == first.find("somewhere to wash")
+    assert asked.asked == ["somewhere to wash"]
+    assert (tmp_path / INDEX_FILE).stat().st_mtime_ns == written
+
+
+def test_a_kept_index_answers_as_a_new_one_does_when_places_came_and_went(tmp_path: Path) -> None:
+    _prepare(tmp_path, _remember(), ConceptEmbedder())
+    places = _remember(N_PLACES + 2).waypoints
+    changed = SemanticMap(waypoints=(*places[3:40], *places[41:]))
+
+    later = _prepare(tmp_path, changed, ConceptEmbedder()).latest
+    new = Recollector(ConceptEmbedder).recollect(changed, _draw())
+
+    assert later is not None
+    for words in ("sink 2", "sink 40", "sink 501", "somewhere to wash", "place 499", "ladder"):
+        assert later.find(words) == new.find(words)
+
+
+def test_an_index_of_another_model_or_with_a_flaw_is_passed_over(tmp_path: Path) -> None:
+    memory, path = _remember(), tmp_path / INDEX_FILE
+    _prepare(tmp_path, memory, ConceptEmbedder())
+    other = ConceptEmbedder()
+    other.name = "others"
+    flawed = bytearray(path.read_bytes())
+    flawed[200] ^= 1
+    for content, embedder in ((path.read_bytes(), other), (flawed, ConceptEmbedder())):
+        path.write_bytes(content)
+        later = _prepare(tmp_path, memory, embedder).latest
+        assert later is not None
+        assert later.find("sink 7").candidates[0].entry.name == "sink 7"
+
+
 @pytest.mark.parametrize("n_kept", [0, 10, 36, 1000, -1])
 def test_a_file_that_is_cut_off_is_passed_over(n_kept: int, tmp_path: Path) -> None:
     _keep(tmp_path, _remember())
     path = tmp_path / THINGS_FILE
     path.write_bytes(path.read_bytes()[:n_kept])
-    assert load_things(path) is None
+    assert load_value(path, Things) is None
     assert len(Recollector(kept=tmp_path).recollect(_remember(), _draw()).things) > 0
 
 
@@ -114,9 +165,9 @@ def test_a_file_of_other_code_or_with_a_flaw_is_passed_over(tmp_path: Path) -> N
     begin = content.index(pickle.PROTO + b"\x05")
     for at in (0, begin + 50):
         path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
-        assert load_things(path) is None
+        assert load_value(path, Things) is None
     path.write_bytes(content)
-    assert load_things(path) is not None
+    assert load_value(path, Things) is not None
 
 
 @pytest.mark.parametrize("name", ["os.system", "mapspeak.cli.main", "builtins.eval"])
@@ -124,7 +175,7 @@ def test_a_file_that_names_a_function_is_not_obeyed(name: str) -> None:
     module, _, function = name.rpartition(".")
     told = f"c{module}\n{function}\n(S'x'\ntR.".encode()
     with pytest.raises(pickle.UnpicklingError):
-        PlainReader(memoryview(told), ()).load()
+        PlainReader(memoryview(told), {}).load()
 
 
 def test_things_that_cannot_be_kept_are_used_all_the_same(tmp_path: Path) -> None:

@@ -38,4 +38,13 @@ class Lease:
     @property
     def is_over(self) -> bool:
         """True when no call is under way and the last one is too long ago."""
-        return not self._n_calls and anyio.current_time() - self._last_heard_s > self.duration_s
+        return self._silence_s > self.duration_s
+
+    async def wait_for_silence(self, duration_s: float) -> None:
+        """Wait until no call is under way and the last one is so long ago."""
+        while (left_s := duration_s - self._silence_s) > 0:  # noqa: ASYNC110 - each call puts it off
+            await anyio.sleep(left_s)
+
+    @property
+    def _silence_s(self) -> float:
+        return 0.0 if self._n_calls else anyio.current_time() - self._last_heard_s

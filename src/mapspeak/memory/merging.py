@@ -192,8 +192,11 @@ def find_cone(look: Waypoint) -> tuple[float, float] | None:
 
     That is between the outermost things that it names, and in the middle of its picture.
     """
-    own = [each for each in look.standpoints[0].landmarks if not _is_of_earlier(each)]
-    bearings = [each.bearing_rad for each in own if each.bearing_rad is not None]
+    bearings = [
+        each.bearing_rad
+        for each in find_named(look)
+        if each.bearing_rad is not None and look.pose_of(each) == look.pose
+    ]
     bearings = bearings if len(bearings) > 1 else []
     if look.picture is not None:
         bearings += [-LEAST_HALF_VIEW_RAD, LEAST_HALF_VIEW_RAD]

@@ -159,7 +159,7 @@ class WorldModel:
         self.places: tuple[RememberedPlace, ...] = (
             previous.places
             if previous is not None and previous.memory.waypoints == memory.waypoints
-            else number_places(memory.waypoints)
+            else number_places(memory.waypoints, () if previous is None else previous.places)
         )
         self.warnings = memory.warnings
         self.recollector: Recollector = recollector or (

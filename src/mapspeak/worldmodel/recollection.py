@@ -5,8 +5,8 @@ Making it is costly, so it is made when first asked for and kept until memory or
 
 import logging
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,7 @@ from mapspeak.memory.things.finding import Things, find_things
 from mapspeak.memory.things.thing import Category
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray
-from mapspeak.worldmodel.keptthings import keep_things, load_things
+from mapspeak.worldmodel.keptvalues import keep_value, lasting, load_value
 from mapspeak.worldmodel.remembered import (
     Remembered,
     RememberedPlace,
@@ -38,8 +38,9 @@ from mapspeak.worldmodel.remembered import (
 logger = logging.getLogger(__name__)
 
 KEPT_FROM = 1000
-"""Things are kept once so many views were joined anew; fewer are joined in a moment."""
-THINGS_FILE = "things.cache"
+"""Things are kept once so many views were joined anew, and their index once so many entries are
+new: fewer are made in a moment."""
+THINGS_FILE, INDEX_FILE = "things.cache", "index.cache"
 
 
 class Search:
@@ -47,28 +48,48 @@ class Search:
 
     Args:
         find_vectors: Find what compares meanings, or None.
+        kept: A file for the index; None keeps none.
     """
 
-    def __init__(self, find_vectors: Callable[[], TextVectors | None]) -> None:
+    def __init__(
+        self, find_vectors: Callable[[], TextVectors | None], *, kept: Path | None
+    ) -> None:
         self._find_vectors = find_vectors
+        self._kept = kept
         self._lock = threading.Lock()
         self._index: EntryIndex | None = None
         self._entries: dict[Remembered, Entry] = {}
 
     @contextmanager
-    def holding(self, entries: Sequence[Entry]) -> Iterator[EntryIndex]:
-        """Give the index with exactly these entries; another question waits meanwhile."""
+    def holding(self, recollection: "Recollection") -> Iterator[EntryIndex]:
+        """Give the index with exactly the entries of this; another question waits meanwhile."""
         with self._lock:
             if self._index is None:
-                self._index = EntryIndex(vectors=self._find_vectors())
-            self._index.hold(entries)
+                with lasting() if recollection.is_large else nullcontext():
+                    self._index = self._begin(is_large=recollection.is_large)
+                    self._index.hold(recollection.entries)
+            self._index.hold(recollection.entries)
             yield self._index
+
+    def _begin(self, *, is_large: bool) -> EntryIndex:
+        vectors, kept = self._find_vectors(), None
+        if self._kept is not None and is_large:
+            kept = load_value(self._kept, EntryIndex, vectors=vectors)
+        return kept if kept and kept.vectors is vectors else EntryIndex(vectors=vectors)
+
+    def keep(self) -> None:
+        """Write the index if much of it is new."""
+        with self._lock:
+            if self._kept is not None and self._index and self._index.n_new >= KEPT_FROM:
+                keep_value(self._kept, self._index)
+                self._index.n_new = 0
 
     def list_entries(self, recollection: "Recollection") -> tuple[Entry, ...]:
         """Return what is said of places and things; what is known of the same ones stays."""
         known = self._entries
         entries = {
-            each: known.get(each) or recollection.describe(each) for each in recollection.everything
+            each: known.get(each) or recollection.describe(each)
+            for each in recollection.by_id.values()
         }
         self._entries = entries
         return tuple(entries.values())
@@ -105,19 +126,26 @@ class Recollection:
         self.n_named = n_named
         self.unseen = unseen
         self._search = search
+        self._around: dict[tuple[Point, float], FloatArray] = {}
 
     def is_of(self, memory: SemanticMap, grid: OccupancyGrid) -> bool:
         """Return True when it was made of these records and this very map."""
         return self.grid is grid and self.memory.waypoints == memory.waypoints
 
     @property
-    def everything(self) -> tuple[Remembered, ...]:
-        """The places, then the things."""
-        return (*self.places, *self.things)
+    def is_large(self) -> bool:
+        """True where making it takes so long that it is worth keeping."""
+        return len(self.places) + len(self.things) >= KEPT_FROM
+
+    @cached_property
+    def by_id(self) -> Mapping[str, Remembered]:
+        """The places, then the things, each under its id."""
+        everything: tuple[Remembered, ...] = (*self.places, *self.things)
+        return {each.id: each for each in everything}
 
     def prepare(self) -> None:
         """Bring the index that answers questions to this; a question meanwhile waits for it."""
-        with self._search.holding(self._entries):
+        with self._search.holding(self):
             pass
 
     def find(self, query: str, *, among: frozenset[str] | None = None, limit: int = 5) -> Answer:
@@ -126,28 +154,28 @@ class Recollection:
         Args:
             among: The ids to choose from; all where None.
         """
-        with self._search.holding(self._entries) as index:
+        with self._search.holding(self) as index:
             return index.find(query, among=among, limit=limit)
 
     def find_called(self, words: str) -> tuple[RememberedThing, ...]:
         """Find the things with that very name: case, plural and typing errors do not count."""
-        with self._search.holding(self._entries) as index:
+        with self._search.holding(self) as index:
             ids = index.find_called(words)
         return tuple(each for each in self.things if each.id in ids)
 
     def find_thing(self, thing_id: str) -> RememberedThing | None:
         """Return the thing with that id, or None."""
-        return next((each for each in self.things if each.id == thing_id), None)
+        found = self.by_id.get(thing_id)
+        return found if isinstance(found, RememberedThing) else None
 
     def find_around(self, point: Point, reach_m: float) -> FloatArray:
         """Return where things are, one at the point itself too, within reach; shape (n, 2)."""
-        off_m = np.hypot(self._positions[:, 0] - point.x, self._positions[:, 1] - point.y)
-        return self._positions[off_m <= reach_m]
-
-    @cached_property
-    def _positions(self) -> FloatArray:
-        known = (each.thing.position for each in self.things)
-        return np.array([(at.x, at.y) for at in known if at is not None]).reshape(-1, 2)
+        known = self._around.get((point, reach_m))
+        if known is None:
+            at = self.unseen.at
+            off_m = np.hypot(at[:, 0] - point.x, at[:, 1] - point.y)
+            known = self._around[point, reach_m] = at[off_m <= reach_m]
+        return known
 
     def find_place(self, name: str) -> RememberedPlace | None:
         """Return the record of exactly that name, or None."""
@@ -158,7 +186,8 @@ class Recollection:
         return {place.waypoint.name: place for place in self.places}
 
     @cached_property
-    def _entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[Entry, ...]:
+        """What is said of places and things."""
         return self._search.list_entries(self)
 
     def describe(self, each: Remembered) -> Entry:
@@ -217,14 +246,16 @@ class Recollector:
         self._loading = threading.RLock()
         self._latest: Recollection | None = None
         self._n_joined = 0
-        self._search = Search(self._find_vectors)
+        self._search = Search(self._find_vectors, kept=kept and kept / INDEX_FILE)
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
         """Return what is remembered on a map; things keep their ids."""
         with self._lock:
             latest = self._latest
             if latest is None or not latest.is_of(memory, grid):
-                self._latest = latest = self._make(memory, grid, latest)
+                is_first = latest is None and len(memory.waypoints) >= KEPT_FROM
+                with lasting() if is_first else nullcontext():
+                    self._latest = latest = self._make(memory, grid, latest)
             return latest
 
     @property
@@ -269,21 +300,31 @@ class Recollector:
 
     def keep(self) -> None:
         """Write the vectors of texts that are new since they were written last."""
-        vectors: TextVectors | None = self.__dict__.get("_vectors")
-        if vectors is not None:
+        if (vectors := self._made_vectors) is not None:
             vectors.keep()
 
+    def keep_if_many(self) -> None:
+        """Write them once there are so many that it is worth it."""
+        if (vectors := self._made_vectors) is not None:
+            vectors.keep_if_many()
+
+    @property
+    def _made_vectors(self) -> TextVectors | None:
+        found: TextVectors | None = self.__dict__.get("_vectors")
+        return found
+
     def keep_things(self) -> None:
-        """Write the things if most of the work to find them would be done again."""
+        """Write the things and their index if most of the work would be done again."""
+        self._search.keep()
         with self._lock:
             latest, n_joined = self._latest, self._n_joined
         if self._kept is not None and latest is not None and n_joined >= KEPT_FROM:
-            keep_things(self._kept / THINGS_FILE, latest.found)
+            keep_value(self._kept / THINGS_FILE, latest.found)
             self._n_joined -= n_joined
 
     def _load_things(self, memory: SemanticMap) -> Things | None:
         is_large = sum(len(place.landmarks) for place in memory.waypoints) >= KEPT_FROM
-        return load_things(self._kept / THINGS_FILE) if self._kept and is_large else None
+        return load_value(self._kept / THINGS_FILE, Things) if self._kept and is_large else None
 
     def _make(
         self, memory: SemanticMap, grid: OccupancyGrid, earlier: Recollection | None

@@ -72,17 +72,15 @@ def number_things(
         The things in the order of their ids, and how many ids were ever given.
     """
     # By identity first: that is most of them, and to compare them as values is slow.
-    very_same = {id(each.thing): each for each in earlier}
-    ids: dict[int, RememberedThing] = {
-        number: very_same.pop(id(thing))
-        for number, thing in enumerate(things)
-        if id(thing) in very_same
-    }
-    same = {each.thing: each for each in very_same.values()}
-    for number, thing in enumerate(things):
-        if number not in ids and thing in same:
-            ids[number] = replace(same.pop(thing), thing=thing)
-    new = [number for number in range(len(things)) if number not in ids]
+    present, known = set(map(id, things)), {id(each.thing) for each in earlier}
+    kept = [each for each in earlier if id(each.thing) in present]
+    same = {each.thing: each for each in earlier if id(each.thing) not in present}
+    ids: dict[int, RememberedThing] = {}
+    new = [number for number, thing in enumerate(things) if id(thing) not in known]
+    for number in new:
+        if things[number] in same:
+            ids[number] = replace(same.pop(things[number]), thing=things[number])
+    new = [number for number in new if number not in ids]
     gone = list(same.values())
     seen_better = match_best_first(
         ((rank, number), each.id, number)
@@ -96,7 +94,7 @@ def number_things(
         if number not in ids:
             n_named += 1
             ids[number] = RememberedThing(id=f"T{n_named}", thing=things[number])
-    return tuple(sorted(ids.values(), key=lambda each: int(each.id[1:]))), n_named
+    return tuple(sorted((*kept, *ids.values()), key=lambda each: int(each.id[1:]))), n_named
 
 
 def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:

@@ -259,6 +259,21 @@ def test_the_vectors_of_texts_are_made_once_whoever_asks(store: EpisodeStore) ->
     assert [text for text in second.embedded if text != "pallets door"] == ["Pallets at the door."]
 
 
+def test_vectors_made_ahead_are_not_made_by_a_question(store: EpisodeStore) -> None:
+    ahead, asked = LetterEmbedder(), LetterEmbedder()
+    rank = VectorRank(store.database, ahead)
+    while rank.learn_ahead():
+        pass
+    assert len(ahead.embedded) == 4
+    store.write(seen("Pallets at the door.", minutes=70))
+    assert rank.learn_ahead()
+    assert ahead.embedded[4:] == ["Pallets at the door."]
+    assert store.find(
+        EpisodeQuery(words="pallets door"), rank=VectorRank(store.database, asked)
+    ).matches
+    assert asked.embedded == ["pallets door"]
+
+
 def test_a_database_that_a_crash_left_half_made_is_made_anew(tmp_path: Path) -> None:
     (tmp_path / "episodes.new").write_bytes(b"SQLite form")
     (tmp_path / "episodes.new-wal").write_bytes(b"half")

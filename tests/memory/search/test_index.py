@@ -384,6 +384,31 @@ def test_vectors_are_kept_with_the_memory_and_not_asked_for_again(tmp_path: Path
     assert [each.name for each in folder.iterdir()] == ["vectors.npz"]
 
 
+def test_a_few_new_vectors_wait_for_more_or_for_the_end(tmp_path: Path) -> None:
+    vectors = TextVectors(ConceptEmbedder(), kept=tmp_path / "vectors.npz")
+    vectors.find(map(str, range(200)))
+    vectors.keep_if_many()
+    vectors.find(["ladder", "sink"])
+    vectors.keep_if_many()
+    assert len(TextVectors(ConceptEmbedder(), kept=tmp_path / "vectors.npz")) == 200
+    vectors.keep()
+    assert len(TextVectors(ConceptEmbedder(), kept=tmp_path / "vectors.npz")) == 202
+
+
+def test_an_entry_under_another_id_is_not_indexed_anew() -> None:
+    embedder = ConceptEmbedder()
+    index = EntryIndex(ENTRIES, vectors=TextVectors(embedder))
+    moved = [replace(each, id=f"{each.id} 2") for each in ENTRIES]
+    n_new, n_asked = index.n_new, len(embedder.asked)
+
+    index.hold(moved[1:])
+
+    assert (index.n_new, len(embedder.asked)) == (n_new, n_asked)
+    for each in ENTRIES:
+        new = EntryIndex(moved[1:], vectors=TextVectors(ConceptEmbedder()))
+        assert index.find(each.name) == new.find(each.name)
+
+
 def test_vectors_that_cannot_be_kept_are_used_all_the_same(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     vectors = TextVectors(ConceptEmbedder(), kept=tmp_path / "file" / "vectors.npz")

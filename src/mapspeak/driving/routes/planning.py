@@ -86,10 +86,9 @@ def _find_remembered(world: WorldModel, words: str) -> Iterator[Place]:
     answer = world.recollection.find(words, limit=MOST_CANDIDATES)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
     most_said = max((each.said_ratio for each in speaking), default=0.0)
-    by_id = {each.id: each for each in world.recollection.everything}
     for each in speaking:
         if each.said_ratio >= SAME_SAID_RATIO * most_said:
-            yield Place(each.entry.id, by_id[each.entry.id])
+            yield Place(each.entry.id, world.recollection.by_id[each.entry.id])
 
 
 MOST_STOPS = 20

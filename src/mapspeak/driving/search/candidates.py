@@ -115,7 +115,7 @@ def unseen_area_m2(world: WorldModel, pose: Pose, *, seen: SeenFloor) -> float:
 
 def _find_remembered(world: WorldModel, thing: str) -> tuple[list[Place], list[Place]]:
     """Return what speaks of the thing, and what may be it by its likeness alone."""
-    by_id = {each.id: Place(each.id, each) for each in world.recollection.everything}
+    by_id = {id_: Place(id_, each) for id_, each in world.recollection.by_id.items()}
     answer = world.recollection.find(thing, limit=MOST_REMEMBERED)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
     is_open = answer.verdict in (Verdict.SEVERAL, Verdict.UNSURE)

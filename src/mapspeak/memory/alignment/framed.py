@@ -4,11 +4,10 @@ Only this module holds back records of other maps: readers get no waypoint, even
 not aligned with the robot's map.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from mapspeak.geometry import Pose
 from mapspeak.memory.alignment.keeping import FrameKeeper
 from mapspeak.memory.episodes.observation import MapPlacing
 from mapspeak.memory.events import Event
@@ -16,9 +15,6 @@ from mapspeak.memory.frames import FrameId, Frames
 from mapspeak.memory.store.memorystore import MemoryStore, Records, Result, WriteReceipt
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
-
-MOST_KEPT = 4
-"""Cached moved records per remembered record."""
 
 
 class FramedMemory(MemoryStore):
@@ -39,8 +35,7 @@ class FramedMemory(MemoryStore):
         super().__init__(path=store.path, walls=store.walls, map_id=store.map_id)
         self.store = store
         self.keeper = FrameKeeper(store, name_robot=name_robot, lock=lock)
-        self._read: tuple[SemanticMap, object, SemanticMap] | None = None
-        self._moved: dict[int, tuple[Waypoint, Pose, Waypoint]] = {}
+        self._read: _Read | None = None
 
     def meet(self, grid: OccupancyGrid) -> None:
         """Find out which frame the robot's map is in (see `FrameKeeper.meet`)."""
@@ -54,23 +49,36 @@ class FramedMemory(MemoryStore):
         memory = self.store.read()
         self.keeper.review(memory)
         here = (self.keeper.has_met, self.keeper.is_placed, self.keeper.frame)
-        if self._read is None or self._read[0] is not memory or self._read[1] != here:
-            self._read = (memory, here, self._place_all(memory.present()))
+        last = self._read
+        if last is None or last.memory is not memory or last.here != here:
+            is_same = last is not None and (last.here, last.memory.frames) == (here, memory.frames)
+            known = last.shown if last is not None and is_same else {}
+            last = self._read = self._place_all(memory, here, known)
         events = self.store.read_events()
         n_elsewhere = len(events) - len(self._place_events(events, memory.frames))
-        return replace(self._read[2], n_events_elsewhere=n_elsewhere)
+        return replace(last.told, n_events_elsewhere=n_elsewhere)
 
-    def _place_all(self, memory: SemanticMap) -> SemanticMap:
-        if not self.keeper.has_met:
-            return memory
-        here: list[Waypoint] = []
-        elsewhere: list[Waypoint] = []
-        for waypoint in memory.waypoints:
-            placed = self._place(waypoint, memory.frames)
-            (elsewhere if placed is None else here).append(placed or waypoint)
-        if len(self._moved) > MOST_KEPT * max(len(memory.waypoints), 1):
-            self._moved.clear()  # Most cached entries are of records that have changed since.
-        return replace(memory, waypoints=tuple(here), elsewhere=tuple(elsewhere))
+    def _place_all(
+        self, memory: SemanticMap, here: tuple[object, ...], known: Mapping[int, "_Shown"]
+    ) -> "_Read":
+        shown = {
+            id(each): known.get(id(each)) or self._show(each, memory.frames)
+            for each in memory.waypoints
+        }
+        present = [(told, is_here) for _, told, is_here in shown.values() if told is not None]
+        told = replace(
+            memory,
+            waypoints=tuple(told for told, is_here in present if is_here),
+            elsewhere=tuple(told for told, is_here in present if not is_here),
+        )
+        return _Read(memory=memory, here=here, told=told, shown=shown)
+
+    def _show(self, waypoint: Waypoint, frames: Frames) -> "_Shown":
+        if waypoint.is_gone:
+            return waypoint, None, False
+        present = waypoint.present()
+        placed = self._place(present, frames) if self.keeper.has_met else present
+        return waypoint, placed or present, placed is not None
 
     def read_events(self) -> tuple[Event, ...]:
         """Return the events in the frame of the robot's map, and no others.
@@ -161,8 +169,23 @@ class FramedMemory(MemoryStore):
         motion = frames.find_transform(of=waypoint.frame, into=here)
         if motion is None:
             return None
-        known = self._moved.get(id(waypoint))
-        if known is None or known[0] is not waypoint or known[1] != motion:
-            known = (waypoint, motion, waypoint.moved(motion, here))
-            self._moved[id(waypoint)] = known
-        return known[2]
+        return waypoint.moved(motion, here)
+
+
+_Shown = tuple[Waypoint, Waypoint | None, bool]
+"""A record; as it is told, None where it is gone; whether it is on the robot's map."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Read:
+    """What was read last.
+
+    Attributes:
+        here: What was known of the robot's map.
+        shown: Each record by its identity: most are the very same the next time.
+    """
+
+    memory: SemanticMap
+    here: tuple[object, ...]
+    told: SemanticMap
+    shown: dict[int, _Shown]

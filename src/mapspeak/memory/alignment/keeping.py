@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory.alignment.comparing import (
@@ -71,6 +73,7 @@ class FrameKeeper:
         self._compared: dict[str, tuple[OccupancyGrid, OccupancyGrid, MapComparison]] = {}
         self._lock = lock or nullcontext()
         self._grid: OccupancyGrid | None = None
+        self._surfaces: MapSurfaces | None = None
         self._is_assumed = False
         # True once this robot may have written on a map whose frame is assumed.
         self._has_begun = False
@@ -126,7 +129,7 @@ class FrameKeeper:
                 self._place(self._store.read())
             if not self.is_placed:
                 self._begin_frame()
-            elif self._grid is not None and _is_worth_keeping(self._grid):
+            elif self._grid is not None and self._is_worth_keeping(self._grid):
                 try:
                     is_kept = self._keep(self._grid)
                 except SemanticMapError as fault:
@@ -137,6 +140,11 @@ class FrameKeeper:
                         return self.place()
             self._has_begun = self._is_assumed
             return self.frame
+
+    def _is_worth_keeping(self, grid: OccupancyGrid) -> bool:
+        if self._surfaces is None or self._surfaces.grid is not grid:
+            self._surfaces = MapSurfaces(grid)
+        return self._surfaces.length_m >= LEAST_STILL_M
 
     def _keep(self, grid: OccupancyGrid) -> bool:
         """Keep the walls if none are kept or they have grown; False if another robot was first."""
@@ -222,7 +230,7 @@ class FrameKeeper:
     def _begin_frame(self) -> None:
         grid = self._grid
         walls = None
-        if grid is not None and _is_worth_keeping(grid):
+        if grid is not None and self._is_worth_keeping(grid):
             walls = self._keep_new(grid)
         frames = self._store.write_frames(
             lambda known: known.added(
@@ -370,9 +378,5 @@ def _is_nearly(before: OccupancyGrid, grid: OccupancyGrid, told: MapComparison) 
     return abs(_floor_m2(grid) - _floor_m2(before)) <= GROWN_RATIO * _floor_m2(before)
 
 
-def _is_worth_keeping(grid: OccupancyGrid) -> bool:
-    return MapSurfaces(grid).length_m >= LEAST_STILL_M
-
-
 def _floor_m2(grid: OccupancyGrid) -> float:
-    return float(grid.free.sum()) * grid.resolution_m**2
+    return np.count_nonzero(grid.free) * grid.resolution_m**2

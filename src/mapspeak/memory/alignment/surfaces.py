@@ -48,10 +48,10 @@ class MapSurfaces:
         rows, cols = np.nonzero(self.cells)
         return self.grid.points_at(rows, cols)
 
-    @property
+    @cached_property
     def length_m(self) -> float:
         """About how many metres of surface the map shows."""
-        return len(self.points) * self.grid.resolution_m
+        return np.count_nonzero(self.cells) * self.grid.resolution_m
 
     @cached_property
     def lines(self) -> tuple[FloatArray, FloatArray]:

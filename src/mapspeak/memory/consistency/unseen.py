@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import cached_property
-from itertools import chain, compress, islice
+from itertools import chain, compress, islice, zip_longest
 
 import numpy as np
 
@@ -36,7 +36,9 @@ class UnseenThings:
         found: All things.
         placed: Those with a position, in the order of all.
         at: Where these are, shape (n, 2), metres.
+        numbers: Of these, by their identity.
         looks: The waypoints by name.
+        looks_at: Where these are, in the order of the file, shape (n, 2), metres.
         known: What looks say against each thing that was looked into, by its identity.
     """
 
@@ -47,16 +49,36 @@ class UnseenThings:
         self.looks = {each.name: each for each in places.waypoints}
         self.found = found
         self.placed = [thing for thing in found.things if thing.position is not None]
-        at = [(thing.position.x, thing.position.y) for thing in self.placed if thing.position]
-        self.at = np.array(at, dtype=np.float64).reshape(-1, 2)
-        self._number = {id(thing): number for number, thing in enumerate(self.placed)}
+        self.numbers = {id(thing): number for number, thing in enumerate(self.placed)}
+        self.at = self._place(earlier)
+        self.looks_at = np.empty((len(self._waypoints), 2))
+        before = () if earlier is None else earlier._waypoints  # noqa: SLF001 - of this class
+        if earlier is not None:
+            self.looks_at[: len(before)] = earlier.looks_at[: len(self._waypoints)]
+        for i, (look, then) in enumerate(zip_longest(self._waypoints, before)):
+            if look is not None and look is not then:
+                self.looks_at[i] = look.pose.x, look.pose.y
         self.known: dict[int, tuple[MemoryFinding, ...]] = {}
         if earlier is not None and earlier.known:
             self._take_over(earlier)
 
+    def _place(self, earlier: "UnseenThings | None") -> FloatArray:
+        """Return where the things are; what is known of the very same ones is taken over."""
+        at = np.empty((len(self.placed), 2))
+        known = {} if earlier is None else earlier.numbers
+        numbers = np.array([known.get(each, -1) for each in self.numbers], dtype=np.intp)
+        if earlier is not None:
+            at[numbers >= 0] = earlier.at[numbers[numbers >= 0]]
+        for number in np.flatnonzero(numbers < 0).tolist():
+            position = self.placed[number].position
+            assert position is not None  # noqa: S101 - those without one are not placed
+            at[number] = position.x, position.y
+        return at
+
     def _take_over(self, earlier: "UnseenThings") -> None:
-        new = [each for each in self.placed if earlier.number_of(each) is None]
-        changed = [each for each in earlier.placed if self.number_of(each) is None] + new
+        new = [self.placed[n] for each, n in self.numbers.items() if each not in earlier.numbers]
+        gone = (n for each, n in earlier.numbers.items() if each not in self.numbers)
+        changed = [earlier.placed[n] for n in gone] + new
         names = {name for thing in changed for name in thing.waypoints}
         before = {name: earlier.seen_from.get(name, ()) for name in names}
         seen_from = {
@@ -67,25 +89,23 @@ class UnseenThings:
             for name in thing.waypoints:
                 seen_from[name].append(thing)
         for things in seen_from.values():
-            things.sort(key=lambda each: self._number[id(each)])
+            things.sort(key=lambda each: self.numbers[id(each)])
         self.seen_from = earlier.seen_from | seen_from
         looks, looked = self.looks, earlier.looks
-        names.update(
-            name
-            for name in looks.keys() | looked.keys()
-            if (now := looks.get(name)) is not (then := looked.get(name)) and now != then
-        )
+        very_same = set(map(id, looks.values())) & set(map(id, looked.values()))
+        others = (each for each in (*looks.values(), *looked.values()) if id(each) not in very_same)
+        names.update(each.name for each in others if looks.get(each.name) != looked.get(each.name))
         is_stale = np.zeros(len(self.placed), dtype=np.bool_)
         for look in filter(None, (each.get(name) for each in (looks, looked) for name in names)):
             is_stale |= np.hypot(*(self.at - (look.pose.x, look.pose.y)).T) <= NEAR_M
         for known, findings in earlier.known.items():
-            number = self._number.get(known)
+            number = self.numbers.get(known)
             if number is not None and not is_stale[number]:
                 self.known[known] = findings
 
     def number_of(self, thing: Thing) -> int | None:
         """Return the number of this very thing among the placed ones; None if it is none."""
-        return self._number.get(id(thing))
+        return self.numbers.get(id(thing))
 
     def find_all(self) -> Iterator[MemoryFinding]:
         """Return the findings about all things: for each look in turn, then what was moved."""
@@ -116,10 +136,6 @@ class UnseenThings:
         return others[0] if is_it else None
 
     @cached_property
-    def _looks_at(self) -> FloatArray:
-        return np.array([(each.pose.x, each.pose.y) for each in self._waypoints]).reshape(-1, 2)
-
-    @cached_property
     def seen_from(self) -> dict[str, list[Thing]]:
         """The placed things that were seen from each waypoint, by its name."""
         seen_from: defaultdict[str, list[Thing]] = defaultdict(list)
@@ -146,8 +162,8 @@ class UnseenThings:
 
     def _unseen(self, thing: Thing) -> tuple[MemoryFinding, ...]:
         if id(thing) not in self.known:
-            number = self._number[id(thing)]
-            off_m = np.hypot(*(self._looks_at - self.at[number]).T)
+            number = self.numbers[id(thing)]
+            off_m = np.hypot(*(self.looks_at - self.at[number]).T)
             near = [self._waypoints[i] for i in np.flatnonzero(off_m <= NEAR_M).tolist()]
             looks = _find_ahead(near, thing)
             shown = (finding for look in looks for finding in self._not_shown(look, [number]))

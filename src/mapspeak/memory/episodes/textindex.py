@@ -4,7 +4,8 @@ import difflib
 import hashlib
 import math
 import sqlite3
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from itertools import chain
 
 import numpy as np
@@ -128,20 +129,58 @@ def _spellings(
 Vectors = NDArray[np.float32]
 
 _BATCH = 512
+_AHEAD = 64
+"""So few take some hundredths of a second: a question that comes meanwhile hardly waits."""
 
 
 class VectorRank:
-    """A `Rank` that embeds each text once, whatever process asks."""
+    """A `Rank` that embeds each text once, whatever process asks.
 
-    def __init__(self, database: EpisodeDatabase, embedder: Embedder) -> None:
+    Args:
+        lock: Held meanwhile where several threads ask: it learns the texts that it has not met.
+    """
+
+    def __init__(
+        self,
+        database: EpisodeDatabase,
+        embedder: Embedder,
+        *,
+        lock: AbstractContextManager[object] | None = None,
+    ) -> None:
         self._database = database
         self._embedder = embedder
         self._row_of: dict[str, int] = {}
         self._vectors: Vectors = np.zeros((0, 0), np.float32)
         self._kept: dict[bytes, bytes] | None = None
+        self._n_ahead = 0
+        self._lock = lock or nullcontext()
+
+    def learn_ahead(self) -> bool:
+        """Make and keep the vectors of some texts that have none; return False at the end of all.
+
+        They are left on the disk: no memory is spent before a question needs them.
+        """
+        selection = (
+            "SELECT text_id, text, hash FROM texts WHERE text_id > ? AND NOT EXISTS (SELECT 1 FROM"
+            " vectors WHERE embedder = ? AND vectors.hash = texts.hash) ORDER BY text_id LIMIT ?"
+        )
+        if not self._database.exists():
+            return False
+        with self._lock:
+            with self._database.reading() as connection:
+                values = [self._n_ahead, self._embedder.name, _AHEAD]
+                rows = connection.execute(selection, values).fetchall()
+            if rows:
+                self._embed({row["hash"]: row["text"] for row in rows})
+                self._n_ahead = rows[-1]["text_id"]
+        return bool(rows)
 
     def __call__(self, query: str, texts: Sequence[str]) -> list[float]:
         """Return the score of each text: the cosine where it is enough, else 0."""
+        with self._lock:
+            return self._score(query, texts)
+
+    def _score(self, query: str, texts: Sequence[str]) -> list[float]:
         self._learn([text for text in dict.fromkeys(texts) if text not in self._row_of])
         if not texts:
             return []
@@ -160,19 +199,19 @@ class VectorRank:
         hashes = [text_hash(text) for text in texts]
         missing = [(key, text) for key, text in zip(hashes, texts, strict=True) if key not in kept]
         for start in range(0, len(missing), _BATCH):
-            batch = missing[start : start + _BATCH]
-            vectors = self._embedder.embed([text for _, text in batch])
-            made = {
-                key: np.asarray(vector, np.float16).tobytes()
-                for (key, _), vector in zip(batch, vectors, strict=True)
-            }
-            # At once: whoever is stopped amid many texts need not begin anew.
-            self._write(made)
-            kept |= made
+            kept |= self._embed(dict(missing[start : start + _BATCH]))
         rows = np.frombuffer(b"".join(map(kept.pop, hashes)), np.float16)
         new = rows.reshape(len(texts), -1).astype(np.float32)
         self._vectors = np.vstack([self._vectors, new]) if self._row_of else new
         self._row_of |= {text: len(self._row_of) + i for i, text in enumerate(texts)}
+
+    def _embed(self, texts: Mapping[bytes, str]) -> dict[bytes, bytes]:
+        """Make the vectors of some texts, under their hashes, and keep them."""
+        vectors = np.asarray(self._embedder.embed(list(texts.values())), np.float16)
+        made = {key: vector.tobytes() for key, vector in zip(texts, vectors, strict=True)}
+        # At once: whoever is stopped amid many texts need not begin anew.
+        self._write(made)
+        return made
 
     def _read(self) -> dict[bytes, bytes]:
         """Return the kept vectors that were not taken yet; all are read once."""

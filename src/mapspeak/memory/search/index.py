@@ -8,11 +8,11 @@ remembered at all, are chances fitted to requests.
 
 import math
 import re
-from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import chain, count
+from operator import attrgetter
 
 import numpy as np
 
@@ -42,9 +42,11 @@ from mapspeak.memory.search.wordindex import (
     MOST_KEPT,
     AskedWords,
     LookAlikes,
+    Numbers,
     WordIndex,
     content_stems,
     content_words,
+    explain,
 )
 
 WORDS_ONLY = "The search compares words only, no meanings."
@@ -64,6 +66,9 @@ _LEAST_NAME_LIKENESS = 0.75
 Of the requests for tuning all misspelt names are at least .75 like the right ones, and all others
 with unknown words at most .69 like any.
 """
+
+
+_CONTENT = attrgetter(*(field.name for field in fields(Entry) if field.name != "id"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,43 +101,56 @@ class EntryIndex:
     Args:
         entries: In any order, with unique ids.
         vectors: Compares meanings; None without a model.
+
+    Attributes:
+        n_new: How many entries were added since it was made, or kept on the disk.
     """
 
     def __init__(
         self, entries: Sequence[Entry] = (), *, vectors: TextVectors | None = None
     ) -> None:
+        self.n_new = 0
         self._entries: dict[int, Entry] = {}
         self._number_of: dict[str, int] = {}
-        self._held: Sequence[Entry] | None = None
-        self._vectors = vectors
+        self._latest: Sequence[Entry] | None = None
+        self._held: dict[int, Entry] = {}
+        self.vectors = vectors
         self._kinds = KindIndex(vectors)
         self._words = WordIndex()
         # With a model, general knowledge is compared by meaning and needs no words.
         self._common_words = WordIndex()
         self._meanings = None if vectors is None else MeaningIndex(vectors)
         self._thresholds = WORD_THRESHOLDS if vectors is None else vectors.embedder.thresholds
-        self._of_key, self._of_letters, self._of_other = (_Numbers() for _ in range(3))
+        self._of_key, self._of_letters, self._of_other = (Numbers() for _ in range(3))
         self._look_alikes: LookAlikes | None = None
         self.hold(entries)
 
     def hold(self, entries: Sequence[Entry]) -> None:
         """Hold exactly these entries; those that it has cost next to nothing."""
-        if entries is self._held:
+        if entries is self._latest:
             return
-        wanted = {entry.id: entry for entry in entries}
-        gone = [
-            number
-            for id_, number in self._number_of.items()
-            if (entry := wanted.get(id_)) is not self._entries[number]
-            and entry != self._entries[number]
-        ]
-        for number in gone:
+        # By identity: most are the very same each time, and to compare them as values is slow.
+        held = self._held or {id(each): each for each in self._entries.values()}
+        now = {id(each): each for each in entries}
+        gone: dict[tuple[object, ...], list[int]] = {}
+        for entry in (each for key, each in held.items() if key not in now):
+            gone.setdefault(_CONTENT(entry), []).append(self._number_of.pop(entry.id))
+        new = []
+        for entry in (each for key, each in now.items() if key not in held):
+            if numbers := gone.get(_CONTENT(entry)):
+                # The same, made again or under another id.
+                number = numbers.pop()
+                self._entries[number], self._number_of[entry.id] = entry, number
+            else:
+                new.append(entry)
+        for number in chain.from_iterable(gone.values()):
             self._remove(number)
-        self._add([entry for id_, entry in wanted.items() if id_ not in self._number_of])
-        self._held = entries
+        self._add(new)
+        self._latest, self._held = entries, now
 
     def _add(self, entries: Sequence[Entry]) -> None:
         self._kinds.add(entries)
+        self.n_new += len(entries)
         free = (number for number in count() if number not in self._entries)
         added = []
         for entry in entries:
@@ -151,10 +169,9 @@ class EntryIndex:
 
     def _remove(self, number: int) -> None:
         entry = self._entries.pop(number)
-        del self._number_of[entry.id]
-        self._words.remove(number)
+        self._words.remove(number, entry.texts)
         if self._meanings is None:
-            self._common_words.remove(number)
+            self._common_words.remove(number, self._kinds.say_of(entry))
         else:
             self._meanings.remove(number)
         for numbers, keys in self._keys_of(entry):
@@ -162,12 +179,16 @@ class EntryIndex:
         self._kinds.remove(entry)
         self._look_alikes = None
 
-    def _keys_of(self, entry: Entry) -> Iterator[tuple["_Numbers", set[str]]]:
+    def _keys_of(self, entry: Entry) -> Iterator[tuple[Numbers, set[str]]]:
         """Return what an entry is called, in the forms that requests are compared with."""
         yield self._of_key, {name_key(name) for name in entry.names}
         yield self._of_letters, {"".join(content_stems(name)) for name in entry.names}
         others = (t for field, t in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME)
         yield self._of_other, {_letters_of(text) for text in others}
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what is kept on the disk: all but what holds in this process alone."""
+        return self.__dict__ | {"_latest": None, "_held": {}, "_look_alikes": None, "n_new": 0}
 
     def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
         """Find what a request may mean.
@@ -230,16 +251,16 @@ class EntryIndex:
         part_ratios, missing = None, None
         # An English model cannot compare other scripts.
         is_latin = any(word.isascii() for _, word in content_words(understood))
-        if self._vectors is None or self._meanings is None or not is_latin:
+        if self.vectors is None or self._meanings is None or not is_latin:
             ratios = self._words.score_ratios(words, size=size)
-            if self._vectors is None:
+            if self.vectors is None:
                 common = self._common_words.ask(understood)
                 ratios = np.maximum(
                     ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS, size=size)
                 )
                 missing = self._kinds.find_missing_called(understood)
         else:
-            vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
+            vector = self.vectors.embedder.embed([understood])[0].astype(np.float64)
             part_ratios, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
             ratios = self._meanings.ratios(part_ratios, size)
         ratios = np.clip(ratios, 0.0, _MOST_WITHOUT_NAME)
@@ -327,8 +348,9 @@ class EntryIndex:
         )
 
     def _explain(self, asked: _Asked, number: int) -> tuple[MatchEvidence, ...]:
-        said = self._words.explain(asked.words, number)
-        return said or self._common_words.explain(asked.common, number)
+        entry = self._entries[number]
+        said = explain(asked.words, entry.texts)
+        return said or explain(asked.common, self._kinds.say_of(entry))
 
 
 def _missing_ratio(asked: _Asked, order: list[int]) -> float:
@@ -338,29 +360,6 @@ def _missing_ratio(asked: _Asked, order: list[int]) -> float:
     if not order:
         return math.inf
     return asked.missing[1] - float(asked.ratios[order[0]])
-
-
-class _Numbers:
-    """The numbers of entries, by what they are called."""
-
-    def __init__(self) -> None:
-        self._numbers: defaultdict[str, set[int]] = defaultdict(set)
-
-    def add(self, number: int, keys: Iterable[str]) -> None:
-        for key in keys:
-            self._numbers[key].add(number)
-
-    def remove(self, number: int, keys: Iterable[str]) -> None:
-        for key in keys:
-            self._numbers[key].remove(number)
-            if not self._numbers[key]:
-                del self._numbers[key]
-
-    def find(self, key: str) -> list[int]:
-        return list(self._numbers.get(key, ()))
-
-    def __contains__(self, key: object) -> bool:
-        return key in self._numbers
 
 
 def _put_right(query: str, words: Iterable[AskedWords]) -> str:

@@ -1,6 +1,6 @@
 """Kinds of things from general knowledge, and the kinds that a request names."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -178,7 +178,7 @@ class KindIndex:
         self._embedded = vectors
         self._vectors = None if vectors is None else vectors.find(texts).astype(np.float64)
         self._kinds_of: dict[str, tuple[ThingKind, ...]] = {}
-        self._n_known: Counter[ThingKind] = Counter()
+        self._n_known: dict[ThingKind, int] = {}
         self._absent: NDArray[np.bool_] | None = None
         self._said_of: dict[tuple[str, ...], Texts] = {}
 
@@ -189,13 +189,18 @@ class KindIndex:
         if self._embedded is not None and self._vectors is not None:
             self._find_by_meaning(new, self._embedded, self._vectors[: self._n_names])
         for entry in entries:
-            self._n_known.update(self._kinds_told(entry))
-        self._absent = None
+            self._count(entry, 1)
 
     def remove(self, entry: Entry) -> None:
         """Count the kinds of an entry no more."""
-        self._n_known.subtract(self._kinds_told(entry))
-        self._absent = None
+        self._count(entry, -1)
+
+    def _count(self, entry: Entry, n: int) -> None:
+        for kind in self._kinds_told(entry):
+            before = self._n_known.get(kind, 0)
+            self._n_known[kind] = before + n
+            if 0 in (before, before + n):
+                self._absent = None
 
     def _kinds_told(self, entry: Entry) -> set[ThingKind]:
         told = {kind for name in entry.names for kind in self._kinds_of[name]}
@@ -205,7 +210,9 @@ class KindIndex:
 
     def _find_absent(self) -> NDArray[np.bool_]:
         if self._absent is None:
-            self._absent = np.array([not self._n_known[kind] for kind in self._kinds], dtype=bool)
+            self._absent = np.array(
+                [not self._n_known.get(kind) for kind in self._kinds], dtype=bool
+            )
         return self._absent
 
     def say_of(self, entry: Entry) -> Texts:

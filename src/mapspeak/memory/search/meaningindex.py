@@ -5,9 +5,8 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
-from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 from zipfile import BadZipFile
 
 import numpy as np
@@ -58,6 +57,9 @@ def find_model() -> Embedder | None:
     return None
 
 
+_NEW_ONE_IN = 100
+
+
 class TextVectors:
     """Cache of the vectors of texts, each embedded once.
 
@@ -80,6 +82,11 @@ class TextVectors:
                     rows = zip(found["texts"].tolist(), found["vectors"], strict=True)
                     self._vectors = dict(rows)
         self._n_kept = len(self._vectors)
+
+    def keep_if_many(self) -> None:
+        """Write the file once one vector in a hundred is new: a write costs as much as they do."""
+        if (len(self) - self._n_kept) * _NEW_ONE_IN > len(self):
+            self.keep()
 
     def keep(self) -> None:
         """Write the file if there are new vectors; one that cannot be written costs only time.
@@ -129,12 +136,8 @@ Floats = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
 
-class _Part(NamedTuple):
-    """A text of an entry: its name alone, or its name with one more sentence."""
-
-    name: str
-    field: MatchField
-    text: str
+_Part = tuple[str, MatchField, str]
+"""A text of an entry: its name, the field, and its name again or one more sentence."""
 
 
 class MeaningIndex:
@@ -149,46 +152,53 @@ class MeaningIndex:
         self._vectors = vectors
         self._number_of: dict[_Part, int] = {}
         self._parts: list[_Part] = []
-        self._own: dict[int, list[int]] = {}
+        # The parts of each entry in turn; those of one that is removed stay there, as of number -1.
+        self._turn_of: dict[int, int] = {}
+        self._numbers, self._starts, self._own = (
+            _Column(np.empty(0, dtype=np.intp)) for _ in range(3)
+        )
         self._rows: dict[str, int] = {}
         n_wide = vectors.find([]).shape[1]
         self._texts = _Column(np.empty((0, n_wide)))
         self._names, self._contexts = (_Column(np.empty(0, dtype=np.intp)) for _ in range(2))
         self._is_common = _Column(np.empty(0, dtype=bool))
         self._lengths = _Column(np.empty(0))
-        self._starts: tuple[IntArray, IntArray, IntArray] | None = None
 
     def add(self, texts: Iterable[tuple[int, Entry, Texts, Texts]]) -> None:
         """Add entries under numbers that none has, each with its texts and what is known of such.
 
         Parts of an entry that is removed stay, for they may come again.
         """
-        begin = len(self._parts)
+        begin, own, numbers, starts = len(self._parts), list[int](), list[int](), list[int]()
+        n_owned, n_turns = len(self._own.now), len(self._numbers.now)
         for number, entry, said, common in texts:
             parts = list(_all_parts(entry, said, common))
             for part in parts:
                 if part not in self._number_of:
                     self._number_of[part] = len(self._parts)
                     self._parts.append(part)
-            self._own[number] = [self._number_of[part] for part in parts]
-        self._starts = None
+            self._turn_of[number] = n_turns + len(numbers)
+            numbers.append(number)
+            starts.append(n_owned + len(own))
+            own += (self._number_of[part] for part in parts)
+        for column, more in ((self._own, own), (self._numbers, numbers), (self._starts, starts)):
+            column.extend(np.array(more, dtype=np.intp))
         self._embed(self._parts[begin:])
 
     def remove(self, number: int) -> None:
         """Remove the entry of a number."""
-        del self._own[number]
-        self._starts = None
+        self._numbers.put(self._turn_of.pop(number), -1)
 
     def _embed(self, parts: Sequence[_Part]) -> None:
-        texts = {text for part in parts for text in (part.name, part.text)}
+        texts = {text for name, _, more in parts for text in (name, more)}
         new = sorted(texts - self._rows.keys())
         self._rows |= {text: len(self._rows) + i for i, text in enumerate(new)}
         self._texts.extend(self._vectors.find(new).astype(np.float64))
-        names = np.array([self._rows[part.name] for part in parts], dtype=np.intp)
-        contexts = np.array([self._rows[part.text] for part in parts], dtype=np.intp)
+        names = np.array([self._rows[name] for name, _, _ in parts], dtype=np.intp)
+        contexts = np.array([self._rows[text] for _, _, text in parts], dtype=np.intp)
         self._names.extend(names)
         self._contexts.extend(contexts)
-        self._is_common.extend(np.array([part.field in _COMMON for part in parts], dtype=bool))
+        self._is_common.extend(np.array([field in _COMMON for _, field, _ in parts], dtype=bool))
         for start in range(0, len(parts), _AT_ONCE):
             rows = slice(start, start + _AT_ONCE)
             sums = self._texts.now[names[rows]] + self._texts.now[contexts[rows]]
@@ -208,22 +218,18 @@ class MeaningIndex:
 
     def ratios(self, part_ratios: Floats, size: int) -> Floats:
         """Return, by number, the similarity of an entry to a phrase, by its most similar part."""
-        if self._starts is None:
-            numbers = np.fromiter(self._own, dtype=np.intp, count=len(self._own))
-            parts = np.fromiter(chain.from_iterable(self._own.values()), dtype=np.intp)
-            starts = np.cumsum([0, *map(len, self._own.values())])[:-1]
-            self._starts = numbers, parts, starts
-        numbers, parts, starts = self._starts
-        found = np.zeros(size)
-        if numbers.size:
-            found[numbers] = np.maximum.reduceat(part_ratios[parts], starts)
-        return found
+        found = np.zeros(size + 1)
+        if self._turn_of:
+            best = np.maximum.reduceat(part_ratios[self._own.now], self._starts.now)
+            found[self._numbers.now] = best
+        return found[:size]
 
     def nearest_text(self, part_ratios: Floats, number: int) -> tuple[MatchField, str]:
         """Return the text of an entry most similar to a phrase, and its part of the record."""
-        own = self._own[number]
-        part = self._parts[own[int(part_ratios[own].argmax())]]
-        return part.field, part.text
+        turn, starts = self._turn_of[number], self._starts.now
+        own = self._own.now[starts[turn] : starts[turn + 1] if turn + 1 < len(starts) else None]
+        _, field, text = self._parts[own[int(part_ratios[own].argmax())]]
+        return field, text
 
 
 class _Column:
@@ -239,24 +245,32 @@ class _Column:
 
     def extend(self, rows: NDArray[Any]) -> None:
         n = self._n + len(rows)
-        if n > len(self._room):
+        self._make_room(n)
+        self._room[self._n : n] = rows
+        self._n = n
+
+    def put(self, row: int, value: object) -> None:
+        self._make_room(self._n)
+        self._room[row] = value
+
+    def _make_room(self, n: int) -> None:
+        # What was read from the disk is locked.
+        if n > len(self._room) or not self._room.flags.writeable:
             n_rows = max(n, 3 * len(self._room) // 2)
             room = np.empty((n_rows, *self._room.shape[1:]), dtype=self._room.dtype)
             room[: self._n] = self.now
             self._room = room
-        self._room[self._n : n] = rows
-        self._n = n
 
 
 def _all_parts(entry: Entry, said: Texts, common: Texts) -> Iterator[_Part]:
     n_names = len(entry.names)
     for field, text in said[:n_names]:
-        yield _Part(text, field, text)
+        yield text, field, text
     for field, text in said[n_names:]:
         if field in _COMPARED and text not in entry.surroundings:
             for sentence in filter(None, _BETWEEN_SENTENCES.split(text)):
-                yield _Part(entry.name, field, sentence)
+                yield entry.name, field, sentence
     for field, text in common:
-        yield _Part(text, field, text)
+        yield text, field, text
         if field is MatchField.USE:
-            yield _Part(entry.name, field, text)
+            yield entry.name, field, text

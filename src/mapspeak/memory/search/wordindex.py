@@ -5,7 +5,6 @@ import math
 import re
 import unicodedata
 from bisect import bisect_left, insort
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -151,7 +150,7 @@ class Vocabulary:
     """Index of the words of all records."""
 
     def __init__(self, words: Iterable[str] = ()) -> None:
-        self._of_stem: defaultdict[str, list[str]] = defaultdict(list)
+        self._of_stem: dict[str, list[str]] = {}
         self._stems: list[str] = []
         self._stems_backwards: list[str] = []
         self._look_alikes: LookAlikes | None = None
@@ -164,7 +163,7 @@ class Vocabulary:
         if own not in self._of_stem:
             insort(self._stems, own)
             insort(self._stems_backwards, own[::-1])
-        insort(self._of_stem[own], word)
+        insort(self._of_stem.setdefault(own, []), word)
         self._look_alikes = None
 
     def remove(self, word: str) -> None:
@@ -248,14 +247,14 @@ class WordIndex:
     """The words of records, each with the numbers of the records that say it."""
 
     def __init__(self) -> None:
-        self._records: dict[int, Texts] = {}
+        self._n_records = 0
         self._weights: dict[str, dict[int, float]] = {}
         self._postings: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]] = {}
         self._vocabulary = Vocabulary()
 
     def add(self, number: int, texts: Texts) -> None:
         """Add a record under a number that none has."""
-        self._records[number] = texts
+        self._n_records += 1
         for word, weight in _weigh_words(texts).items():
             if word not in self._weights:
                 self._weights[word] = {}
@@ -263,9 +262,10 @@ class WordIndex:
             self._weights[word][number] = weight
             self._postings.pop(word, None)
 
-    def remove(self, number: int) -> None:
-        """Remove the record of a number."""
-        for word in _weigh_words(self._records.pop(number)):
+    def remove(self, number: int, texts: Texts) -> None:
+        """Remove the record of a number, which was added with these texts."""
+        self._n_records -= 1
+        for word in _weigh_words(texts):
             del self._weights[word][number]
             self._postings.pop(word, None)
             if not self._weights[word]:
@@ -278,7 +278,7 @@ class WordIndex:
         for shown, compared in content_words(phrase):
             spellings = self._vocabulary.find_spellings(compared)
             n_with = sum(len(self._weights[spelling]) for spelling in spellings)
-            weight = math.log1p(len(self._records) / max(n_with, 1))
+            weight = math.log1p(self._n_records / max(n_with, 1))
             is_doubtful = self._vocabulary.is_doubtful(compared)
             found.append(AskedWords(shown, spellings, weight, is_doubtful))
         return tuple(found)
@@ -311,26 +311,54 @@ class WordIndex:
             self._postings[word] = numbers, np.array(list(found.values()))
         return self._postings[word]
 
-    def explain(self, asked: Sequence[AskedWords], number: int) -> tuple[MatchEvidence, ...]:
-        """Return at most one finding in a record for each word of a phrase, in their order."""
-        findings = (self._finding(word, number) for word in asked)
-        return tuple(finding for finding in findings if finding)
 
-    def _finding(self, asked: AskedWords, number: int) -> MatchEvidence | None:
-        """Return the weightiest place in a record that says a word."""
-        findings = (
-            MatchEvidence(
-                query_word=asked.shown,
-                found_word=shown,
-                field=field,
-                text=text,
-                kind=asked.spellings[compared],
-            )
-            for field, text in self._records.get(number, ())
-            for shown, compared in split_words(_without_denied(field, text))
-            if compared in asked.spellings
+def explain(asked: Sequence[AskedWords], texts: Texts) -> tuple[MatchEvidence, ...]:
+    """Return at most one finding in a record for each word of a phrase, in their order."""
+    findings = (_find_word(word, texts) for word in asked)
+    return tuple(finding for finding in findings if finding)
+
+
+def _find_word(asked: AskedWords, texts: Texts) -> MatchEvidence | None:
+    """Return the weightiest place in a record that says a word."""
+    findings = (
+        MatchEvidence(
+            query_word=asked.shown,
+            found_word=shown,
+            field=field,
+            text=text,
+            kind=asked.spellings[compared],
         )
-        return max(findings, key=lambda finding: finding.weight, default=None)
+        for field, text in texts
+        for shown, compared in split_words(_without_denied(field, text))
+        if compared in asked.spellings
+    )
+    return max(findings, key=lambda finding: finding.weight, default=None)
+
+
+class Numbers:
+    """The numbers of entries, by what they are called."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, set[int]] = {}
+
+    def add(self, number: int, keys: Iterable[str]) -> None:
+        """Add a number under keys."""
+        for key in keys:
+            self._numbers.setdefault(key, set()).add(number)
+
+    def remove(self, number: int, keys: Iterable[str]) -> None:
+        """Remove a number that is under these keys."""
+        for key in keys:
+            self._numbers[key].remove(number)
+            if not self._numbers[key]:
+                del self._numbers[key]
+
+    def find(self, key: str) -> list[int]:
+        """Return the numbers under a key."""
+        return list(self._numbers.get(key, ()))
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._numbers
 
 
 def _weigh_words(texts: Texts) -> dict[str, float]:

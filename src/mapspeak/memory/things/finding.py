@@ -78,14 +78,16 @@ class Things:
         things: Those with most views first, then by label and place.
         sight: The map, ready for looking around in it.
         seen: By the name of each waypoint.
-        pools: By the views that bear related names.
+        of_label: The sightings of each label.
+        pools: By the related names that their views bear.
         n_joined: How many views were joined anew to find them.
     """
 
     things: tuple[Thing, ...]
     sight: SightMap
     seen: Seen
-    pools: dict[frozenset[WeighedView], Pool]
+    of_label: dict[str, frozenset[WeighedView]]
+    pools: dict[frozenset[str], Pool]
     n_joined: int = 0
 
     def find_sight_ratios(self, waypoint: Waypoint, points: FloatArray) -> FloatArray:
@@ -141,21 +143,20 @@ def find_things(
         earlier = None
     sight = earlier.sight if earlier else build_sight_map(grid)
     seen = read_waypoints(sight, semantic_map.waypoints, earlier.seen if earlier else {})
-    found = Things(things=(), sight=sight, seen=seen, pools={})
-    divided, known = _divide(seen), earlier.pools if earlier else {}
-    left = [pool for views, pool in known.items() if views not in divided]
+    of_label, changed = _divide(seen, earlier)
+    found = Things(things=(), sight=sight, seen=seen, of_label=of_label, pools={})
+    groups, known = group_names(list(of_label)), earlier.pools if earlier else {}
+    same = {names for names in groups if names in known and changed.isdisjoint(names)}
+    left = [pool for names, pool in known.items() if names not in same]
     before = Pool(
         solved={views: each for pool in left for views, each in pool.solved.items()},
         things={made_of: thing for pool in left for made_of, thing in pool.things.items()},
     )
-    pools = {views: known.get(views) or _solve(found, views, before) for views in divided}
-    n_joined = sum(
-        len(part)
-        for views, pool in pools.items()
-        if views not in known
-        for part in pool.solved
-        if part not in before.solved
-    )
+    pools = {
+        names: known[names] if names in same else _solve(found, names, before) for names in groups
+    }
+    parts = chain.from_iterable(pools[names].solved for names in groups if names not in same)
+    n_joined = sum(len(part) for part in parts if part not in before.solved)
     ranked = sorted(chain.from_iterable(p.ranked for p in pools.values()), key=itemgetter(0))
     things = tuple(thing for _, thing in ranked)
     return replace(found, things=things, pools=pools, n_joined=n_joined)
@@ -167,16 +168,29 @@ def _is_of(sight: SightMap, grid: OccupancyGrid) -> bool:
     return old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
 
 
-def _divide(seen: Seen) -> list[frozenset[WeighedView]]:
-    """Return all sightings in pools of related labels."""
-    of_label: dict[str, list[WeighedView]] = {}
-    for stand in chain.from_iterable(seen.values()):
+def _divide(
+    seen: Seen, earlier: Things | None
+) -> tuple[dict[str, frozenset[WeighedView]], set[str]]:
+    """Return the sightings of each label, and the labels whose sightings are others than before."""
+    known = {} if earlier is None else earlier.seen
+    gone = _by_label(stands for name, stands in known.items() if seen.get(name) is not stands)
+    new = _by_label(stands for name, stands in seen.items() if known.get(name) is not stands)
+    before = {} if earlier is None else earlier.of_label
+    of_label, changed = dict(before), set[str]()
+    for label in gone.keys() | new.keys():
+        left = before.get(label, frozenset()) - gone.get(label, set()) | new.get(label, set())
+        if left != before.get(label):
+            changed.add(label)
+            of_label[label] = left
+    return {label: views for label, views in of_label.items() if views}, changed
+
+
+def _by_label(seen: Iterable[Sequence[Surroundings]]) -> dict[str, set[WeighedView]]:
+    found: defaultdict[str, set[WeighedView]] = defaultdict(set)
+    for stand in chain.from_iterable(seen):
         for each in stand.sightings:
-            of_label.setdefault(each.landmark.label, []).append(each)
-    return [
-        frozenset(each for label in group for each in of_label[label])
-        for group in group_names(list(of_label))
-    ]
+            found[each.landmark.label].add(each)
+    return found
 
 
 def _order(view: WeighedView) -> tuple[str, str, float, float, float, int]:
@@ -185,9 +199,9 @@ def _order(view: WeighedView) -> tuple[str, str, float, float, float, int]:
     return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad, view.number
 
 
-def _solve(found: Things, pool: Iterable[WeighedView], before: Pool) -> Pool:
+def _solve(found: Things, names: frozenset[str], before: Pool) -> Pool:
     """Join views of related names; what is known of those that may be joined is taken as it is."""
-    views = sorted(pool, key=_order)
+    views = sorted(chain.from_iterable(found.of_label[name] for name in names), key=_order)
     solved = {
         part: before.solved.get(part) or _join(found.sight, part)
         for part in divide_views(found.sight, [v for v in views if v.likelihood is not None])
@@ -287,25 +301,19 @@ def _find_against(
 def _points_past(
     found: Things, view: WeighedView, group: Sequence[WeighedView], position: Point
 ) -> bool:
-    at = np.array([[position.x, position.y]])
+    at, bearing_rad = np.array([[position.x, position.y]]), view.landmark.bearing_rad or 0.0
     return (
         all(view.waypoint is not each.waypoint for each in group)
-        and _off_rad(view, position) >= ELSEWHERE_RAD
-        and _off_heading_rad(view, position) <= IN_PICTURE_RAD
+        and _off_rad(view.waypoint.pose, bearing_rad, position) >= ELSEWHERE_RAD
+        and _off_rad(view.waypoint.pose, 0.0, position) <= IN_PICTURE_RAD
         and name_the_same(view.landmark.label, group[0].landmark.label)
         and bool(found.find_sight_ratios(view.waypoint, at)[0] > LIKELY_RATIO)
     )
 
 
-def _off_rad(sighting: WeighedView, point: Point) -> float:
-    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad or 0.0
+def _off_rad(pose: Pose, bearing_rad: float, point: Point) -> float:
     ahead = pose.yaw_rad + bearing_rad
     return abs(math.remainder(pose.point.bearing_to(point) - ahead, math.tau))
-
-
-def _off_heading_rad(view: WeighedView, point: Point) -> float:
-    pose = view.waypoint.pose
-    return abs(math.remainder(pose.point.bearing_to(point) - pose.yaw_rad, math.tau))
 
 
 def _rank(thing: Thing) -> Rank:
@@ -358,13 +366,14 @@ def _by_votes(words: Iterable[str]) -> list[str]:
 
 
 def _view(sighting: WeighedView, position: Point | None) -> View:
-    place, has_way = sighting.waypoint.pose.point, sighting.landmark.bearing_rad is not None
+    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad
+    place, has_way = pose.point, bearing_rad is not None
     return View(
         waypoint=sighting.waypoint.name,
         landmark=sighting.landmark,
         place=place,
         far_m=place.distance_to(position) if position and has_way else None,
-        off_rad=_off_rad(sighting, position) if position and has_way else None,
+        off_rad=_off_rad(pose, bearing_rad or 0.0, position) if position and has_way else None,
     )
 
 

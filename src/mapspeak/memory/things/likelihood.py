@@ -200,7 +200,7 @@ def read_waypoints(sight: SightMap, waypoints: Sequence[Waypoint], known: Seen) 
                 for each in kept
                 if each.of is waypoint or each.of == waypoint
             )
-        read[waypoint.name] = read.get(waypoint.name, ()) + kept
+        read[waypoint.name] = (*read[waypoint.name], *kept) if waypoint.name in read else kept
         new += () if kept else ((waypoint, stand) for stand in waypoint.standpoints)
     near_m, far_m = look_around(sight, [stand.pose for _, stand in new])
     for (waypoint, stand), near, far in zip(new, near_m, far_m, strict=True):

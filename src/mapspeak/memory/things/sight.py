@@ -181,13 +181,14 @@ def bearing_index(angles: FloatArray) -> IntArray:
     return np.asarray(np.round(angles * (N_RAYS / math.tau)), dtype=np.intp) % N_RAYS
 
 
-_BESIDE = range(-2, 3)
-"""Rays of the map that a line of sight may be, 1.5 degrees apart: a heading is no better known."""
+_BESIDE = (np.arange(N_RAYS)[:, None] + np.arange(-2, 3)) % N_RAYS
+"""For each ray those of the map that a line of sight may be, 1.5 degrees apart: a heading is no
+better known."""
 
 
 def find_farthest_beside(far_m: FloatArray) -> FloatArray:
     """Return the farthest of what is met along each ray and those beside it."""
-    return np.asarray(np.max([np.roll(far_m, step) for step in _BESIDE], axis=0))
+    return np.asarray(far_m[_BESIDE].max(axis=1))
 
 
 _LEAST_MET = 0.05

@@ -87,8 +87,7 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
     if query.room_id is None:
         words, room_id = split_room(world, query.words)
         query = replace(query, words=words, room_id=room_id)
-    everything: list[Remembered] = [*world.recollection.places, *world.things]
-    passing = {each.id: each for each in everything if _passes(world, each, query)}
+    passing = _find_passing(world, query)
     answer = _find(world, query, passing)
     if moved := _find_moved(world, query, answer, passing):
         passing = {id_: each for id_, each in passing.items() if id_ not in moved}
@@ -114,9 +113,19 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
     )
 
 
+def _find_passing(world: WorldModel, query: RecallQuery) -> Mapping[str, Remembered]:
+    """Return what passes the filters of a query by its id: all that is remembered without any."""
+    everything = world.recollection.by_id
+    filters = (query.kind, query.near, query.since, query.until, query.room_id)
+    if not any(each is not None for each in filters):
+        return everything
+    return {id_: each for id_, each in everything.items() if _passes(world, each, query)}
+
+
 def _find(world: WorldModel, query: RecallQuery, passing: Mapping[str, Remembered]) -> Answer:
+    among = None if passing is world.recollection.by_id else frozenset(passing)
     limit = max(query.n, MOST_TIED)
-    return world.recollection.find(query.words, among=frozenset(passing), limit=limit)
+    return world.recollection.find(query.words, among=among, limit=limit)
 
 
 def _find_moved(

@@ -1,0 +1,233 @@
+"""What a large memory was made into, kept beside it, so that a later session need not make it.
+
+A file is a pickle with its arrays behind it, which are mapped into memory and read when needed:
+all of one type in a row, for there may be a hundred thousand. It only stands for what was made
+earlier: what it holds is compared with the present records and map. Reading it makes plain values
+of mapspeak and arrays, and the indexes named here; it calls nothing.
+"""
+
+import contextlib
+import gc
+import hashlib
+import io
+import json
+import mmap
+import os
+import pickle
+import struct
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache, partial
+from itertools import chain
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+import mapspeak
+from mapspeak.memory.search.meaningindex import TextVectors
+
+_HEAD = struct.Struct("<16sIQQ")
+"""A digest of the code; checksum of what follows; lengths of the list of types and the pickle."""
+_ALIGNED = 64
+_FOREIGN = {
+    ("_codecs", "encode"),
+    ("datetime", "datetime"),
+    ("datetime", "timedelta"),
+    ("datetime", "timezone"),
+    ("numpy", "dtype"),
+    ("numpy._core.multiarray", "scalar"),
+}
+_INDEXES = {
+    "index": {"EntryIndex"},
+    "kinds": {"KindIndex"},
+    "meaningindex": {"MeaningIndex", "_Column"},
+    "wordindex": {"LookAlikes", "Numbers", "Vocabulary", "WordIndex"},
+}
+"""Classes of `mapspeak.memory.search` that are no values, by their module."""
+_UNREADABLE = (
+    AttributeError,
+    EOFError,
+    ImportError,
+    IndexError,
+    KeyError,
+    OSError,
+    TypeError,
+    ValueError,
+    pickle.UnpicklingError,
+    struct.error,
+)
+Kept = TypeVar("Kept")
+
+
+def keep_value(path: Path, value: object) -> None:
+    """Write a value to a file, which is replaced as a whole; a failure costs only time."""
+    told = io.BytesIO()
+    writer = _PlainWriter(told, protocol=5)
+    writer.dump(value)
+    rows = {kind: sum(each.nbytes for each in row) for kind, row in writer.rows.items()}
+    types = json.dumps(rows).encode()
+    content = types + told.getbuffer()
+    gap = bytes(-(_HEAD.size + len(content)) % _ALIGNED)
+    head = _HEAD.pack(_digest_code(), zlib.crc32(content), len(types), len(content) - len(types))
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with unfinished.open("wb") as file:
+                file.writelines((head, content, gap))
+                file.writelines(each.data for each in chain.from_iterable(writer.rows.values()))
+                file.flush()
+                os.fsync(file.fileno())
+            unfinished.replace(path)
+        finally:
+            unfinished.unlink(missing_ok=True)
+
+
+def load_value(path: Path, kind: type[Kept], *, vectors: TextVectors | None = None) -> Kept | None:
+    """Return the value of a file; None if it is missing, broken or written by other code.
+
+    Args:
+        vectors: What an index compares meanings with; one of another model is not read.
+    """
+    try:
+        with path.open("rb") as file:
+            content = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+        code, checksum, n_types, n_told = _HEAD.unpack_from(content)
+        begin, end = _HEAD.size + n_types, _HEAD.size + n_types + n_told
+        if code != _digest_code() or zlib.crc32(content[_HEAD.size : end]) != checksum:
+            return None
+        rows, start = {}, end + -end % _ALIGNED
+        for each, n_bytes in json.loads(bytes(content[_HEAD.size : begin])).items():
+            rows[each] = np.frombuffer(content[start : start + n_bytes], dtype=each)
+            start += n_bytes
+        if start != len(content):
+            return None
+        with lasting():
+            found = PlainReader(content[begin:end], rows, vectors=vectors).load()
+    except _UNREADABLE:
+        return None
+    return found if isinstance(found, kind) else None
+
+
+@contextlib.contextmanager
+def lasting() -> Iterator[None]:
+    """Spare the garbage collector from many values that are made here to stay.
+
+    It would go through all of them again and again meanwhile, and now and then ever after.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        if was_enabled:
+            gc.enable()
+
+
+class _PlainWriter(pickle.Pickler):
+    """Writes a value as its class and its fields, and vectors of texts as the model's name.
+
+    Attributes:
+        rows: The arrays of each type, which are written behind the pickle.
+    """
+
+    def __init__(self, told: io.BytesIO, *, protocol: int) -> None:
+        super().__init__(told, protocol=protocol)
+        self.rows: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
+        self._n: Counter[str] = Counter()
+
+    def reducer_override(self, value: Any) -> Any:  # noqa: ANN401 - as pickle declares it
+        """Return how a value is made again."""
+        if isinstance(value, np.ndarray):
+            kind = value.dtype.str
+            start = self._n[kind]
+            self._n[kind] += value.size
+            self.rows[kind].append(np.ascontiguousarray(value))
+            return cut_array, (kind, start, self._n[kind], value.shape)
+        if isinstance(value, TextVectors):
+            return TextVectors, (value.embedder.name,)
+        if not isinstance(value, type) and _is_slotted(type(value)):
+            return type(value), tuple(getattr(value, each.name) for each in fields(value))
+        return NotImplemented
+
+
+class PlainReader(pickle.Unpickler):
+    """Reads values of mapspeak, times, arrays and indexes; refuses every other name."""
+
+    def __init__(
+        self,
+        told: memoryview,
+        rows: Mapping[str, NDArray[Any]],
+        *,
+        vectors: TextVectors | None = None,
+    ) -> None:
+        super().__init__(io.BytesIO(told))
+        self._vectors = vectors
+        self._cut_array = partial(cut_array, rows)
+
+    def find_class(self, module: str, name: str) -> object:
+        """Return what makes values of a name; raise UnpicklingError where it is no plain value."""
+        root, _, rest = module.partition(".")
+        if root != mapspeak.__name__:
+            if (module, name) not in _FOREIGN:
+                raise pickle.UnpicklingError(name)
+            return super().find_class(module, name)
+        if (module, name) == (TextVectors.__module__, TextVectors.__name__):
+            return self._find_vectors
+        if (module, name) == (__name__, cut_array.__name__):
+            return self._cut_array
+        found: object = super().find_class(module, name)
+        is_index = name in _INDEXES.get(rest.removeprefix("memory.search."), ())
+        if not isinstance(found, type) or not (
+            is_index or is_dataclass(found) or issubclass(found, Enum)
+        ):
+            raise pickle.UnpicklingError(name)
+        return _maker(found) if _is_slotted(found) else found
+
+    def _find_vectors(self, name: str) -> TextVectors:
+        if self._vectors is None or self._vectors.embedder.name != name:
+            raise pickle.UnpicklingError(name)
+        return self._vectors
+
+
+def cut_array(
+    rows: Mapping[str, NDArray[Any]], kind: str, start: int, end: int, shape: tuple[int, ...]
+) -> NDArray[Any]:
+    """Return one of the arrays that are in a row."""
+    found = rows[kind][start:end]
+    return found if len(shape) == 1 else found.reshape(shape)
+
+
+def _is_slotted(kind: type) -> bool:
+    return is_dataclass(kind) and "__slots__" in vars(kind)
+
+
+def _maker(kind: type) -> Callable[..., object]:
+    """Return what makes a value of its fields without checks: several times as fast as pickle."""
+    new, setters = object.__new__, [getattr(kind, each.name).__set__ for each in fields(kind)]
+
+    def make(*values: object) -> object:
+        made: object = new(kind)
+        for put, value in zip(setters, values, strict=True):
+            put(made, value)
+        return made
+
+    return make
+
+
+@cache
+def _digest_code() -> bytes:
+    """Return a digest of what makes things: our modules and words, and the version of NumPy."""
+    root, digest = Path(mapspeak.__file__).parent, hashlib.blake2b(digest_size=16)
+    digest.update(f"{mapspeak.__version__} {np.__version__}".encode())
+    parts = ("memory", "spatial", "worldmodel")
+    files = (each for part in parts for each in (root / part).rglob("*.*"))
+    for file in sorted(each for each in files if each.suffix in (".py", ".txt", ".yaml")):
+        digest.update(file.read_bytes())
+    return digest.digest()
