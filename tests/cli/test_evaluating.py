@@ -10,8 +10,10 @@ from mapspeak.cli.evaluating import evaluate
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.catalogue import agent_names
 from mapspeak.evaluation.agents.models.chat import Thinking
+from mapspeak.evaluation.runs.plan import RunOptions
+from mapspeak.evaluation.runs.runner import run_evaluation
 from mapspeak.evaluation.tasks.catalogue import FAMILIES
-from mapspeak.evaluation.trials import read_results, trial_folder, write_result
+from mapspeak.evaluation.trials import TrialResult, read_results, trial_folder, write_result
 from mapspeak.server.reports.representations import Representation
 from reportmaking import make_result, make_trial
 
@@ -128,6 +130,33 @@ def test_a_report_is_made_anew_from_all_results_that_are_there(tmp_path: Path) -
     page = (folder / "report.html").read_text()
     assert "question-way/" in page
     assert "/random/" in page
+
+
+def test_a_report_of_a_run_that_was_stopped_says_how_many_trials_are_missing(
+    tmp_path: Path,
+) -> None:
+    world, folder = tmp_path / "two.yaml", tmp_path / "out"
+    world.write_text(TWO_ROOMS)
+
+    def stop(_result: TrialResult) -> None:
+        raise KeyboardInterrupt
+
+    options = RunOptions(
+        agents=("random",), tasks=("question-way",), worlds=(str(world),), n_trials=2, folder=folder
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run_evaluation(options, on_plan=lambda _plan: None, on_done=stop)
+    status, printed = run("--report", "--out", str(folder))
+    assert status == 1
+    assert "2 of 3 trials have no result." in printed
+
+
+@pytest.mark.parametrize("number", ["nan", "inf"])
+def test_a_time_that_is_no_number_is_refused(tmp_path: Path, number: str) -> None:
+    status, printed = run("--hang-s", number, "--out", str(tmp_path / "out"))
+    assert status == 2
+    assert "--hang-s" in printed
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_report_of_a_folder_without_results_is_refused(tmp_path: Path) -> None:

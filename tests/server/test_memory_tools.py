@@ -158,3 +158,20 @@ async def test_what_is_found_is_told_in_ten_lines_with_what_may_be_meant(tmp_pat
     assert [row[0] for row in rows] == [each["id"] for each in report["candidates"]]
     assert {len(row) for row in rows} == {len(lines[2].split(" | "))}
     assert len(lines) <= 10
+
+
+async def test_a_damaged_kept_map_is_told_with_its_path_and_blocks_no_write(
+    tmp_path: Path,
+) -> None:
+    before = {"name": "Dock", "description": "a dock"}
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        report_of(await client.call_tool("write_semantic_data", before))
+    kept = tmp_path / "semantic_map.memory" / "map.yaml"
+    kept.write_text("nothing\n")
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        note = {"name": "Sink", "description": "a sink"}
+        written = report_of(await client.call_tool("write_semantic_data", note))
+        remembered = text_of(await client.call_tool("get_semantic_data", {}))
+    assert any(str(kept) in each and "cannot be read" in each for each in written["warnings"])
+    assert "a sink" in remembered
+    assert "a dock" in (tmp_path / "semantic_map.yaml").read_text()

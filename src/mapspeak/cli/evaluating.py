@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mapspeak.cli.shared.options import INTERRUPTED
+from mapspeak.cli.shared.options import INTERRUPTED, require_finite
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
 @click.option(
     "--hang-s",
     type=click.FloatRange(min=1.0),
+    callback=require_finite,
     default=1200.0,
     show_default=True,
     help="A trial without a turn for so long by the wall clock is killed; the others go on.",
@@ -126,14 +127,14 @@ def evaluate(*, folder: Path, is_quiet: bool, is_report_only: bool, **chosen: An
 
     Started again with the same folder, it goes on where it was left off. The exit status is 0 when
     every trial came to a result, whatever the result is; 1 when one crashed or hung; 2 when
-    something that was asked for does not exist; 130 after Ctrl-C or SIGTERM.
+    something that was asked for does not exist; 130 after Ctrl-C or SIGTERM. With --report it is 1
+    also when a trial that was begun in that folder, or waited there for its turn, has no result.
     """
     from mapspeak.evaluation.agents.catalogue import check_agent  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.evaluation.runs.plan import RunOptions  # noqa: PLC0415
 
     if is_report_only:
-        _report(folder)
-        return
+        sys.exit(_report(folder))
     options = RunOptions(folder=folder, **chosen)
     for agent in options.agents:
         for amount in options.thinking:
@@ -141,10 +142,10 @@ def evaluate(*, folder: Path, is_quiet: bool, is_report_only: bool, **chosen: An
     sys.exit(_run(options, is_quiet=is_quiet))
 
 
-def _report(folder: Path) -> None:
-    """Make page and log of a run's folder from all results in it."""
+def _report(folder: Path) -> int:
+    """Make page and log of a run's folder from all results in it, and return the exit status."""
     from mapspeak.evaluation.runs.runner import writing_to  # noqa: PLC0415 - heavy
-    from mapspeak.evaluation.trials import read_results  # noqa: PLC0415
+    from mapspeak.evaluation.trials import count_asked, read_results  # noqa: PLC0415
 
     results = read_results(folder)
     if not results:
@@ -154,6 +155,10 @@ def _report(folder: Path) -> None:
         )
     with writing_to(folder):
         _write_report(folder, results, {})
+    n_asked = max(count_asked(folder), len(results))
+    if n_missing := n_asked - len(results):
+        click.echo(f"{n_missing} of {n_asked} trials have no result.", err=True)
+    return 1 if n_missing or any(each.state.is_broken for each in results) else 0
 
 
 def _write_report(

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from mapspeak.cli.mapjobs import MapJob, MapOptions, Output, find_maps, is_description, plan_jobs
-from mapspeak.cli.shared.options import ANCHOR_OPTION, FILE, usual_modes
+from mapspeak.cli.shared.options import ANCHOR_OPTION, FILE, require_finite, usual_modes
 from mapspeak.errors import ConfigError, MapError
 from mapspeak.geometry import Point
 from mapspeak.server.text.world.maps import (
@@ -34,6 +34,7 @@ from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap, find_rooms
     "--resolution",
     "resolution_m",
     type=click.FloatRange(min=0, min_open=True),
+    callback=require_finite,
     help="Metres per pixel, for bare pictures: 0 occupied, 205 unknown, 254 free.",
 )
 @click.option("--out", "picture", type=FILE, help="The annotated PNG.")

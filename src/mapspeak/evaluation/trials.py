@@ -62,6 +62,10 @@ class Trial:
         return "/".join((*plain, f"{self.number:03d}"))
 
 
+N_PARTS = 5
+"""Of a trial's id."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Budget of a trial.
@@ -255,6 +259,11 @@ _TURN: TypeAdapter[Turn] = TypeAdapter(Turn)
 def trial_folder(run: Path, trial: Trial) -> Path:
     """Return where a trial lies in a run's folder."""
     return run / TRIALS / trial.id
+
+
+def count_asked(run: Path) -> int:
+    """Return how many trials were asked for in a run: each has a folder, with a result or not."""
+    return sum(path.is_dir() for path in (run / TRIALS).glob("/".join("*" * N_PARTS)))
 
 
 def clear_trial(run: Path, trial: Trial) -> Path:

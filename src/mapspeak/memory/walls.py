@@ -63,7 +63,8 @@ class WallFolder:
         except MapError as error:
             raise SemanticMapError(
                 f"The map that the records belong to cannot be read: {error.message}",
-                hint=f"Take {path} away if it is of no use: the next write keeps a new one.",
+                hint=f"Put {path} back from a copy: what was remembered on it waits until then. "
+                "What is written goes on with a map of its own.",
             ) from error
 
     def keep(self, grid: OccupancyGrid, name: str, *, is_first: bool = False) -> bool:

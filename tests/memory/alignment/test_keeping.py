@@ -418,9 +418,27 @@ def test_records_without_walls_are_of_the_map_that_their_file_names(
     assert elsewhere(opened(store, MAP, map_id="annex")) == ["dock"]
 
 
-def test_a_damaged_kept_map_is_said(memory: FramedMemory, store: SemanticMapStore) -> None:
-    store.path.with_name("places.memory").joinpath("map.yaml").write_text("nothing\n")
+def test_a_damaged_kept_map_is_told_and_blocks_no_write(
+    memory: FramedMemory, store: SemanticMapStore
+) -> None:
+    kept = store.path.with_name("places.memory") / "map.yaml"
+    whole = kept.read_bytes()
+    kept.write_text("nothing\n")
 
+    later = opened(store, MAP)
+    with pytest.raises(SemanticMapError, match="cannot be read") as told:
+        later.keeper.compare()
     with pytest.raises(SemanticMapError, match="cannot be read"):
-        opened(store, MAP)
+        later.keeper.realign()
+    later.write(replace(DOCK, name="bench"))
+
+    assert str(kept) in told.value.hint
+    assert (here(later), elsewhere(later)) == (["bench"], ["dock", "sink"])
+    assert here(opened(store, MAP)) == ["bench"], "the next start knows its map again"
     assert here(memory) == ["dock", "sink"]
+    assert kept.read_text() == "nothing\n"
+    kept.write_bytes(whole)
+    mended = opened(store, MAP)
+    mended.keeper.realign()
+    assert here(mended) == ["dock", "sink", "bench"]
+    assert elsewhere(mended) == []

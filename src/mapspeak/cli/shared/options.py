@@ -100,6 +100,15 @@ def read_pose(
     return pose
 
 
+def require_finite(
+    _context: click.Context, _parameter: click.Parameter, value: float | None
+) -> float | None:
+    """Return the number of an option; the range of one lets NaN pass."""
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter("the number has to be finite")
+    return value
+
+
 PRIVATE = 0o077
 _umask_of_person: ContextVar[int | None] = ContextVar("umask_of_person", default=None)
 

@@ -209,6 +209,7 @@ def run_jobs(
     for each, earlier in [(each, _find_earlier(run, each.trial)) for each in jobs]:
         if earlier is None or (has_retry and earlier.state.is_broken):
             waiting.append(each)
+            trial_folder(run, each.trial).mkdir(parents=True, exist_ok=True)
         else:
             settle(earlier)
     processes = _processes()

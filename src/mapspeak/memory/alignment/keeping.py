@@ -78,6 +78,7 @@ class FrameKeeper:
         # True once this robot may have written on a map whose frame is assumed.
         self._has_begun = False
         self._fault: SemanticMapError | None = None
+        self._damage: SemanticMapError | None = None
         self.frame: FrameId = None
         self.is_placed = False
         self.n_maps = 0
@@ -91,7 +92,7 @@ class FrameKeeper:
         """Find the frame of the robot's map; it keeps that frame while it grows.
 
         Raises:
-            SemanticMapError: The memory or a kept map cannot be read.
+            SemanticMapError: The memory cannot be read.
         """
         with self._lock:
             before, self._grid = self._grid, grid
@@ -111,9 +112,12 @@ class FrameKeeper:
                 self._place(memory)
 
     def has_walls(self, frame_id: FrameId) -> bool:
-        """Return True if something distinguishes a frame from others."""
+        """Return True if something distinguishes a frame from others, be it damaged or not."""
         name = self._walls_of(frame_id)
-        return name is not None and self._load(name) is not None
+        try:
+            return name is not None and self._load(name) is not None
+        except SemanticMapError:
+            return True
 
     def place(self) -> FrameId:
         """Return the frame of the robot's map, for a write; begin a new one where none is known.
@@ -176,7 +180,9 @@ class FrameKeeper:
                 raise fault
             if grid is None:
                 return None
-            strange = self._find_strange(self._store.read())
+            strange = list(self._find_strange(self._store.read()))
+            if self._damage is not None:
+                raise self._damage
             return next((self._compare(name, kept, grid) for _, name, kept in strange), None)
 
     def realign(self) -> RealignReceipt:
@@ -194,6 +200,8 @@ class FrameKeeper:
             self._compared.clear()
             self._loaded.clear()
             strange = list(self._find_strange(self._store.read()))
+            if not strange and self._damage is not None:
+                raise self._damage
             if not strange:
                 return self._tell_all_known(grid)
             receipts = [self._align(frame_id, name, kept) for frame_id, name, kept in strange]
@@ -301,9 +309,17 @@ class FrameKeeper:
                 yield frame_id, name, kept
 
     def _find_kept(self, memory: SemanticMap) -> Iterator[tuple[FrameId, str, OccupancyGrid]]:
-        """Return the frames with kept walls, the memory's own first."""
+        """Return the frames with kept walls, the memory's own first; note which are damaged.
+
+        Records of a frame whose walls cannot be read wait, as those of any other map do.
+        """
+        self._damage = None
         for frame_id, name in memory.frames.walls.items():
-            kept = self._load(name)
+            try:
+                kept = self._load(name)
+            except SemanticMapError as damage:
+                self._damage = damage
+                continue
             if kept is not None:
                 yield frame_id, name, kept
 

@@ -50,7 +50,8 @@ class DatabaseWalls:
         except (zlib.error, ValueError, MapError) as error:
             raise SemanticMapError(
                 f"The map {name!r} that the records belong to cannot be read: {error}",
-                hint="Remove its row from mapspeak.walls: the next write keeps a new one.",
+                hint="Put its row of mapspeak.walls back from a copy: what was remembered on it "
+                "waits until then. What is written goes on with a map of its own.",
             ) from error
 
     def keep(self, grid: OccupancyGrid, name: str, *, is_first: bool = False) -> bool:
