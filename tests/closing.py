@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from drawing import grid_from_text
 from guarding import corners
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory import SemanticMap
+from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.events import Effect, Event
 from mapspeak.places.recall.events import (
     close_floor_of,
@@ -67,9 +67,9 @@ def revision_with(*events: Event, now: datetime = NOW) -> MapRevision:
     )
 
 
-def world_on(revision: MapRevision) -> WorldModel:
-    robot = Pose(WEST.x, WEST.y)
-    return WorldModel(revision.grid, robot, SemanticMap(), radius_m=RADIUS_M, revision=revision)
+def world_on(revision: MapRevision, *places: Waypoint) -> WorldModel:
+    robot, memory = Pose(WEST.x, WEST.y), SemanticMap(waypoints=places)
+    return WorldModel(revision.grid, robot, memory, radius_m=RADIUS_M, revision=revision)
 
 
 def goes_north(revision: MapRevision, start: Point = WEST, goal: Point = EAST) -> bool:

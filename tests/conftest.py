@@ -1,5 +1,8 @@
 """What all tests share."""
 
+import time
+from collections.abc import Iterator
+
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -16,3 +19,13 @@ settings.register_profile("thorough", settings.get_profile("untimed"), max_examp
 def anyio_backend() -> str:
     """Runs asynchronous tests on asyncio, as the server does."""
     return "asyncio"
+
+
+@pytest.fixture
+def central_european_time(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Lets this machine's zone have a summer time, from the last Sundays of March to October."""
+    monkeypatch.setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()

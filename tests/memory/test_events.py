@@ -1,3 +1,4 @@
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -312,6 +313,28 @@ def test_an_event_comes_again_on_its_days_at_its_hours(every: Every, days: list[
         assert event.is_current(at_eight) == is_day
         assert event.is_current(at_eight + timedelta(minutes=119)) == is_day
         assert not event.is_current(at_eight + timedelta(hours=2))
+
+
+@pytest.mark.usefixtures("central_european_time")
+@pytest.mark.parametrize(
+    "first",
+    [
+        datetime(2026, 3, 20, 8, 0, tzinfo=timezone(timedelta(hours=1))),
+        datetime(2026, 3, 20, 7, 0, tzinfo=UTC),
+    ],
+)
+def test_an_event_comes_again_at_its_hours_in_summer_time_too(first: datetime) -> None:
+    event = replace(
+        cleaning(Every.DAY), begins=first, until=first + timedelta(hours=2), text="cleaning"
+    )
+    before = datetime(2026, 3, 28, 12, 0, tzinfo=timezone(timedelta(hours=1)))
+    after = datetime(2026, 7, 1, 5, 0, tzinfo=timezone(timedelta(hours=2)))
+
+    assert event.find_time(after)[0] == after.replace(hour=8)
+    assert event.find_time(before)[1] == datetime(2026, 3, 29, 8, 0, tzinfo=UTC)
+    assert "from 2026-03-29 08:00, until 2026-03-29 10:00" in event.sentence(before)
+    assert not event.is_current(after.replace(hour=7, minute=59))
+    assert not event.is_current(after.replace(hour=10))
 
 
 def test_an_event_over_midnight_lasts_into_the_next_day() -> None:

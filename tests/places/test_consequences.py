@@ -169,6 +169,22 @@ def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:
     assert "the shortest leads over the area 'C1', closed by event E2 until 14:00" in told
 
 
+def test_the_nearest_is_by_the_shortest_path_also_where_the_way_leads_round() -> None:
+    far_round = Waypoint(name="printer", pose=Pose(18.0, 6.0))
+    other = Waypoint(name="copier", pose=Pose(18.0, 2.0))
+    world = world_on(revision_with(event(Effect.AVOID)), other, far_round)
+
+    told = describe_measures(world, start="robot", places=["printer", "copier"])
+    nearest = find_place(world, "nearest remembered place")
+
+    first, second = (line.split(" | ") for line in told.splitlines() if " | 18.00, " in line)
+    assert (first[0], second[0]) == ("printer", "copier")
+    assert nearest.name == "W2"
+    assert "m by the shortest path" in nearest.reason
+    assert float(first[2]) > float(second[2]), "the way round is told as it is driven"
+    assert "path m is of the way to drive" in told
+
+
 async def test_an_event_closes_and_opens_again_by_itself_and_the_policy_stays() -> None:
     clock = WallClock(NOW)
     pit = rectangle("pit", (2.0, 2.0), (3.0, 3.0))

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import datetime, timedelta, tzinfo
 from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
@@ -66,7 +66,7 @@ class Effect(StrEnum):
 
 
 class Every(StrEnum):
-    """Recurrence of an event, at the hours and for the duration of the first time."""
+    """Recurrence of an event, at the first time's hours by the operator's clock on the wall."""
 
     ONCE = "once"
     DAY = "day"
@@ -135,17 +135,19 @@ class Event:
         """Return its present occurrence, else the next one, as begin and end."""
         if self.every is Every.ONCE or self.begins is None or self.until is None:
             return self.begins, self.until
-        length, zone = self.until - self.begins, self.begins.tzinfo
-        day = max((now - length).astimezone(zone), self.begins).date()
+        first = show_local(self.begins, now)
+        length = show_local(self.until, now) - first
+        day = max(show_local(now, now) - length, first).date()
         while True:
-            begins = datetime.combine(day, self.begins.timetz())
+            begins = datetime.combine(day, first.time())
             is_day = (
                 self.every is Every.DAY
                 or (self.every is Every.WORKDAY and begins.weekday() < _N_WORKDAYS)
-                or (self.every is Every.WEEK and begins.weekday() == self.begins.weekday())
+                or (self.every is Every.WEEK and begins.weekday() == first.weekday())
             )
-            if is_day and now < begins + length:
-                return begins, begins + length
+            ends = read_local(begins + length, now)
+            if is_day and now < ends:
+                return read_local(begins, now), ends
             day += timedelta(days=1)
 
     def is_over(self, now: datetime) -> bool:
@@ -244,8 +246,27 @@ def find_place_ids(words: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_PLACE_ID.findall(words.upper())))
 
 
+def show_local(moment: datetime, now: datetime) -> datetime:
+    """Return what the operator's clock on the wall shows at a moment, in summer or winter time."""
+    return moment.astimezone(_find_zone(now)).replace(tzinfo=None)
+
+
+def read_local(shown: datetime, now: datetime) -> datetime:
+    """Return the moment at which the operator's clock on the wall shows this."""
+    zone = _find_zone(now)
+    return shown.astimezone() if zone is None else shown.replace(tzinfo=zone)
+
+
+def _find_zone(now: datetime) -> tzinfo | None:
+    """Return the zone of `now`; None for this machine's, which knows of summer time.
+
+    The operator's time has the offset of today alone.
+    """
+    return None if now.utcoffset() == now.astimezone().utcoffset() else now.tzinfo
+
+
 def _say_time(time: datetime, now: datetime) -> str:
-    local = time.astimezone(now.tzinfo)
+    local = show_local(time, now)
     return f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
 
 

@@ -21,7 +21,7 @@ class Way:
         end: The point it ends at: in a room and before a thing, where the robot would stand.
         straight_m: As the crow flies: to and from a thing itself, else between the same points as
             the path. None for a thing without a position.
-        path_m: By path; None where the robot cannot get through.
+        path_m: By path, round what is slow; None where the robot cannot get through.
         through: Ids of the regions and doors on the way, in order, both ends included.
         clearance_m: From the robot's centre to the nearest obstacle, where it is least; None
             without a path.
@@ -37,14 +37,9 @@ class Way:
 
 
 def measure_path(world: WorldModel, start: Place, goal: Place) -> float | None:
-    """Return the metres by path between two places; None where the robot cannot get through."""
+    """Return the metres of the shortest path: "nearest" means that; None if there is no path."""
     distances = _distances_from(world, start)
-    end = standing_point(world, goal)
-    if distances is None or world.map.weights is None:
-        return None if distances is None else distances.distance_to(end)
-    # The way round is not the shortest one.
-    path = world.map.find_path_over(distances, end)
-    return None if path is None else path.length_m
+    return None if distances is None else distances.distance_to(standing_point(world, goal))
 
 
 def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
@@ -54,8 +49,7 @@ def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
     straight_m = None if at is None or to is None else at.distance_to(to)
     distances = _distances_from(world, start)
     path = None if distances is None else world.map.find_path_over(distances, end)
-    path_m = None if path is None else measure_path(world, start, goal)
-    if path is None or path_m is None:
+    if distances is None or path is None:
         return Way(start=start, goal=goal, end=end, straight_m=straight_m)
     cells = _cells_along(world, path)
     return Way(
@@ -63,7 +57,8 @@ def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
         goal=goal,
         end=end,
         straight_m=straight_m,
-        path_m=path_m,
+        # The way round is not the shortest one.
+        path_m=path.length_m if world.map.weights is not None else distances.distance_to(end),
         through=_name_regions(world, *cells),
         clearance_m=float(world.map.clearance_m[cells].min()),
     )

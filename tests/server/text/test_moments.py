@@ -1,7 +1,7 @@
 """Moments as models write them."""
 
 import re
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
 
@@ -14,6 +14,23 @@ NOW = datetime(2026, 11, 23, 12, 0, tzinfo=UTC)
 @pytest.mark.parametrize("written", re.split(r", | or ", AHEAD))
 def test_what_the_schema_of_an_event_names_is_read(written: str) -> None:
     assert read_moment(written, NOW) is not None
+
+
+@pytest.mark.usefixtures("central_european_time")
+@pytest.mark.parametrize(
+    ("written", "at_utc"),
+    [
+        ("2026-07-01T08:00", datetime(2026, 7, 1, 6, 0, tzinfo=UTC)),
+        ("tomorrow 8:00", datetime(2026, 3, 29, 6, 0, tzinfo=UTC)),
+        ("7:00", datetime(2026, 3, 29, 5, 0, tzinfo=UTC)),
+        ("in 24h", datetime(2026, 3, 29, 11, 0, tzinfo=UTC)),
+    ],
+)
+def test_a_time_after_a_change_to_summer_time_is_that_of_the_wall(
+    written: str, at_utc: datetime
+) -> None:
+    saturday = datetime(2026, 3, 28, 12, 0, tzinfo=timezone(timedelta(hours=1)))
+    assert read_moment(written, saturday) == at_utc
 
 
 @pytest.mark.parametrize("written", re.split(r", | or ", PAST))

@@ -16,6 +16,7 @@ from mapspeak.memory.events import (
     current_events,
     find_place_ids,
     gives_orders,
+    show_local,
 )
 from mapspeak.places.naming import Place, Spot, Thing
 from mapspeak.places.relations.choosing import find_place
@@ -203,7 +204,7 @@ def _area_of(event: Event, revision: MapRevision, now: datetime) -> ClosedArea |
     until = ""
     _, end = event.find_time(now)
     if end is not None:
-        local = end.astimezone(now.tzinfo)
+        local = show_local(end, now)
         until = f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
     return ClosedArea(
         name=_title_of(event),

@@ -315,7 +315,8 @@ def _say_way(world: WorldModel, found: Ranked, start: Referent | None) -> str:
         return f"{who} is in it"
     if math.isinf(found.value):
         return f"no way leads to it from {who}"
-    way = f"{found.value:.1f} m by path from {who}"
+    path = "path" if world.map.weights is None else "the shortest path"
+    way = f"{found.value:.1f} m by {path} from {who}"
     if isinstance(found.thing, RememberedThing) and found.thing.thing.position is not None:
         return f"{at.distance_to(found.thing.thing.position):.1f} m straight, {way}"
     return way

@@ -12,6 +12,7 @@ from mapspeak.memory.episodes.observation import (
     Observation,
     ObservationKind,
 )
+from mapspeak.memory.events import show_local
 from mapspeak.memory.quoting import quote, quote_name, tell_name
 from mapspeak.places.recall.nearby import Nearby
 from mapspeak.server.text.wording import say_count, say_point, say_pose
@@ -114,7 +115,7 @@ def _say_clock(time: datetime, now: datetime | None) -> str:
     """Return the time of day, with its date where that is not today."""
     if now is None:
         return f"{time:%Y-%m-%d %H:%M}"
-    local = time.astimezone(now.tzinfo)
+    local = show_local(time, now)
     return f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
 
 

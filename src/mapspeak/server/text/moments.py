@@ -5,6 +5,7 @@ from datetime import datetime, time, timedelta
 from types import MappingProxyType
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.memory.events import read_local, show_local
 
 AHEAD = "2026-11-20T09:30, 09:30, 3 pm, tomorrow 8:00, in 2h, now"
 PAST = "2026-11-20, 2026-11-20T09:30, 09:30, 2h ago, last 10 min, yesterday, this morning, Monday"
@@ -114,17 +115,22 @@ def _read_period(
         )
     words = " ".join(text.split())
     try:
-        for read in (_read_span, _read_day, _read_clock):
-            period = read(words.casefold(), now, is_ahead)
+        span = _read_span(words.casefold(), now, is_ahead)
+        if span is not None:
+            return span
+        shown = show_local(now, now)
+        for read in (_read_day, _read_clock):
+            period = read(words.casefold(), shown, is_ahead)
             if period is not None:
-                return period
+                begin, end = period
+                return read_local(begin, now), None if end is None else read_local(end, now)
         moment = datetime.fromisoformat(words)
     except (ValueError, OverflowError) as error:
         raise SemanticMapError(
             f"{text[:40]!r} is no time.",
             hint=f"Write it as one of {AHEAD if is_ahead else PAST}.",
         ) from error
-    begin = moment if moment.tzinfo else moment.replace(tzinfo=now.tzinfo)
+    begin = moment if moment.tzinfo else read_local(moment, now)
     is_day = len(words) <= len("2026-11-20")
     return begin, begin + _DAY_LONG if is_day else None
 
@@ -163,7 +169,7 @@ def _read_day(words: str, now: datetime, is_ahead: bool) -> Period | None:  # no
     clock = _find_clock(rest)
     if clock is None:
         return None
-    moment = datetime.combine(day, clock, now.tzinfo)
+    moment = datetime.combine(day, clock)
     if said["day"] in _WEEKDAYS and not said["which"]:
         if is_ahead and moment <= now:
             moment += _WEEK_LONG
@@ -189,7 +195,7 @@ def _read_clock(words: str, now: datetime, is_ahead: bool) -> Period | None:  # 
     clock = _find_clock(words)
     if clock is None:
         return None
-    moment = datetime.combine(now, clock, now.tzinfo)
+    moment = datetime.combine(now, clock)
     return (moment + _DAY_LONG if is_ahead and moment <= now else moment), None
 
 

@@ -182,8 +182,11 @@ def _way_table(world: WorldModel, start: Place, ends: Sequence[Place]) -> str:
         ends, key=lambda end: math.inf if (m := lengths_m[end.name]) is None else m
     )
     begin = check_place(world, Place(start.name, Spot(standing_point(world, start))))
+    order = "nearest first"
+    if world.map.weights is not None:
+        order += " by the shortest path; path m is of the way to drive"
     table = build_table(
-        f"Ways from {start.name} ({say_point(begin.pose.point)}), nearest first",
+        f"Ways from {start.name} ({say_point(begin.pose.point)}), {order}",
         ("to", "stand at x, y", "path m", "straight m", "through", "least clearance m"),
         nearest_first[:MOST_WAYS],
         lambda end: _way_row(world, find_way(world, start, end)),
