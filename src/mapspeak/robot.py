@@ -248,6 +248,7 @@ class CauseCode(StrEnum):
     GOAL_OFF_MAP = "goal_off_map"
     GOAL_OCCUPIED = "goal_occupied"
     NAVIGATION_AT_AREA = "navigation_at_area"
+    NO_WAY_ROUND = "no_way_round"
     VELOCITY_AT_AREA = "velocity_at_area"
     OTHERS_AT_AREA = "others_at_area"
     NOT_SENT_ON = "not_sent_on"

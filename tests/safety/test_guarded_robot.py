@@ -51,6 +51,7 @@ HALL = grid_from_text(
 FINE_HALL = grid_from_text("\n".join("." * 90 for _ in range(40)), resolution_m=0.05)
 WEST, EAST = Pose(1.5, 2.25), Pose(9.5, 2.25)
 MIDDLE = rectangle("pit", (5.0, 1.5), (6.0, 3.0))
+AREA = ClosedArea(name="pit", outline=MIDDLE.outline)
 
 
 def guarded(
@@ -276,7 +277,8 @@ async def test_a_robot_that_goes_another_way_is_stopped_before_it_enters_an_area
     assert status.cause.code is CauseCode.NAVIGATION_AT_AREA
     assert status.cause.name == "keep-out area 'pit'"
     assert fake.pose.x < 5.0 - fake.description.radius_m
-    assert fake.n_stops == 1
+    # It was led on once from there.
+    assert fake.n_stops == 2
     assert [line.event for line in audit_of(tmp_path)][-2:] == ["stop", "ended"]
 
 
@@ -289,7 +291,7 @@ async def test_a_drive_is_watched_however_short_the_waits_for_it_are(
     await robot.send_goal(EAST)
     while robot.now_s < 10.0:
         await robot.sleep(sleep_s)
-    assert fake.n_stops == 1
+    assert fake.n_stops == 2
     assert fake.pose.x < 5.0 - fake.description.radius_m
 
 
@@ -370,6 +372,89 @@ async def test_a_drive_along_an_area_is_not_stopped(tmp_path: Path) -> None:
     goal_id = await robot.send_goal(Pose(9.5, 0.75))
     await robot.sleep(20.0)
     assert (await robot.fetch_goal_status(goal_id)).state is GoalState.ARRIVED
+
+
+async def test_a_drive_is_led_round_what_closes_on_its_way_without_a_stop(tmp_path: Path) -> None:
+    clock = WallClock()
+    pit = AreaRule(name="pit", outline=MIDDLE.outline, hours=Hours(begins=time(13)))
+    fake = FakeRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(pit,)), clock)
+    goal_id = await robot.send_goal(EAST)
+    await robot.sleep(1.0)
+    clock.now = clock.now.replace(hour=13)
+    nearest_m = 99.0
+    while not (status := await robot.fetch_goal_status(goal_id)).state.is_final:
+        nearest_m = min(nearest_m, AREA.distance_to(fake.pose.point))
+        await robot.sleep(0.2)
+    assert status.state is GoalState.ARRIVED
+    assert fake.pose == EAST
+    assert fake.n_stops == 0
+    assert nearest_m >= fake.description.radius_m + KEEP_M
+
+
+async def test_a_drive_is_led_the_short_way_again_once_that_is_open(tmp_path: Path) -> None:
+    clock = WallClock()
+    pit = AreaRule(name="pit", outline=MIDDLE.outline, hours=Hours(ends=time(13)))
+    fake = FakeRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(pit,)), clock)
+    await robot.send_goal(EAST)
+    await robot.sleep(0.5)
+    clock.now = clock.now.replace(hour=13)
+    await robot.sleep(2.0)
+    assert list(fake.goals.values())[-1] == EAST
+
+
+async def test_a_drive_that_no_other_way_is_left_for_ends_before_what_closed(
+    tmp_path: Path,
+) -> None:
+    clock = WallClock()
+    outline = corners((5.0, 0.0), (6.0, 4.5))
+    wall = AreaRule(name="wall", outline=outline, hours=Hours(begins=time(13)))
+    fake = FakeRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(wall,)), clock)
+    goal_id = await robot.send_goal(EAST)
+    await robot.sleep(1.0)
+    clock.now = clock.now.replace(hour=13)
+    await robot.sleep(20.0)
+    status = await robot.fetch_goal_status(goal_id)
+    assert (status.state, code_of(status)) == (GoalState.BLOCKED, CauseCode.NO_WAY_ROUND)
+    assert fake.pose.x < 5.0 - fake.description.radius_m
+
+
+class OnceSwervingRobot(FakeRobot):
+    """Drives its own way to the first place that it is sent to."""
+
+    async def send_goal(self, goal: Pose) -> str:
+        return await super().send_goal(goal if self.goals else EAST)
+
+
+async def test_a_robot_that_was_stopped_before_an_area_is_led_round_it(tmp_path: Path) -> None:
+    fake = OnceSwervingRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    goal_id = await robot.send_goal(EAST)
+    states = set()
+    while not (status := await robot.fetch_goal_status(goal_id)).state.is_final:
+        states.add(status.state)
+        await robot.sleep(0.1)
+    assert (status.state, fake.pose, fake.n_stops) == (GoalState.ARRIVED, EAST, 1)
+    assert states == {GoalState.DRIVING}
+
+
+@pytest.mark.parametrize("how", ["stop", "cancel_goal"])
+async def test_a_drive_that_is_ended_while_the_robot_waits_before_an_area_goes_no_further(
+    tmp_path: Path, how: str
+) -> None:
+    fake = OnceSwervingRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    goal_id = await robot.send_goal(EAST)
+    while fake.n_stops == 0:
+        await fake.sleep(0.1)
+        await robot.watch()
+    assert (await robot.fetch_goal_status(goal_id)).state is GoalState.DRIVING
+    await (robot.stop() if how == "stop" else robot.cancel_goal(goal_id))
+    await robot.sleep(20.0)
+    assert len(fake.goals) == 1
+    assert (await robot.fetch_goal_status(goal_id)).state is GoalState.CANCELLED
 
 
 async def test_a_drive_ends_when_its_goal_is_closed_meanwhile(tmp_path: Path) -> None:
@@ -761,7 +846,7 @@ async def test_a_stop_before_an_area_that_failed_is_tried_again(tmp_path: Path) 
     goal_id = await robot.send_goal(EAST)
     with pytest.raises(LinkError):
         await robot.sleep(20.0)
-    await robot.watch()
+    await robot.sleep(5.0)
     assert fake.n_stops >= 1
     assert (await robot.fetch_goal_status(goal_id)).state.is_final
 

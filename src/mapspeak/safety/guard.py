@@ -10,7 +10,7 @@ from functools import partial
 import anyio
 import anyio.to_thread
 
-from mapspeak.errors import PolicyError
+from mapspeak.errors import ConfigError, PolicyError
 from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
 from mapspeak.memory.events import Effect, Event
@@ -27,7 +27,7 @@ from mapspeak.safety.approvals import (
     current_scope,
     current_word,
 )
-from mapspeak.safety.audit import AuditLog, Caller, current_caller
+from mapspeak.safety.audit import NOBODY, AuditLog, Caller, current_caller
 from mapspeak.safety.commands import Command, CommandKind, DriveCommand
 from mapspeak.safety.deciding import Allowed, Decision, NeedsApproval, Refused, Situation, decide
 from mapspeak.safety.policy import AreaRule, Otherwise, Policy
@@ -291,6 +291,16 @@ class Guard:
                 said=said,
             )
         except PolicyError as error:
+            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
+
+    def latch(self) -> None:
+        """Hold the robot after a client's stop, where the policy says so."""
+        caller = current_caller()
+        if caller is NOBODY or not self.policy.latches_on_stop:
+            return
+        try:
+            self.hold.put(f"{caller.tool or 'a client'} stopped it", at=self.wall_clock())
+        except ConfigError as error:
             logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
 
     def _decide(

@@ -1,13 +1,13 @@
 """A robot behind the guard: the only one that a session and its tools get."""
 
 import logging
-import math
 from collections import OrderedDict
 from dataclasses import replace
 
 import anyio
+import anyio.to_thread
 
-from mapspeak.errors import ConfigError, LinkError, MapspeakError, NextStep, PolicyError
+from mapspeak.errors import LinkError, MapspeakError, NextStep, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.hold import say_hold
 from mapspeak.robot import (
@@ -23,21 +23,18 @@ from mapspeak.robot import (
     RobotDescription,
     StampedPose,
 )
-from mapspeak.safety.audit import NOBODY, current_caller
 from mapspeak.safety.commands import DriveCommand, say_command
 from mapspeak.safety.guard import Guard, MapReviser, Permit
 from mapspeak.safety.monitor import GoalMonitor, HoldKeeper, KeepOutMonitor, Mover, StandingCheck
 from mapspeak.safety.planning import GuardedDrive, Plan, Planner
 from mapspeak.safety.teleop import Teleop
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.revision import MapRevision
 
 WATCH_S = 0.1
 """Robot time between two looks at where a drive leads."""
 EPSILON_S = 1e-6
-BLIND_S = 2.0
-"""Wall time without a pose after which a robot that must keep off some area is stopped."""
 REPEAT_S = 0.5
-"""Wall time between two looks whether a held robot stands."""
 N_KEPT = 200
 
 logger = logging.getLogger(__name__)
@@ -65,8 +62,7 @@ class GuardedRobot:
         self._drive: GuardedDrive | None = None
         self._verdicts: OrderedDict[str, GoalStatus] = OrderedDict()
         self._n_stops, self._is_stop_owed = 0, False
-        self._watching, self._stepping = anyio.Lock(), anyio.Lock()
-        self._seen_at_s = -math.inf
+        self._watching, self._stepping, self._leading = anyio.Lock(), anyio.Lock(), anyio.Lock()
         self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
         self.planner = Planner(robot, reviser=reviser, policy=guard.policy)
         self.teleop = Teleop(robot, planner=self.planner, reviser=reviser)
@@ -74,7 +70,7 @@ class GuardedRobot:
 
     @property
     def description(self) -> RobotDescription:
-        """What is fixed about this robot; its radius includes the clearance that it must keep."""
+        """What is fixed about this robot; its radius includes its clearance."""
         return replace(self._robot.description, radius_m=self.planner.radius_m)
 
     @property
@@ -190,7 +186,7 @@ class GuardedRobot:
         try:
             await self._stop("stopped")
         finally:
-            self._latch()
+            self._guard.latch()
 
     @property
     def name(self) -> str:
@@ -210,14 +206,18 @@ class GuardedRobot:
             if self._is_stop_owed:
                 await self._repeat_stop()
             drive = self._drive
-            fault = await self._find_fault(self._mover)
+            revision, fault = self._reviser.latest, None
+            if revision is not None and revision.areas:
+                other = Mover.VELOCITY if self.teleop.is_under_way else Mover.OTHERS
+                mover = other if drive is None else Mover.NAVIGATION
+                fault = await self._monitor.look(self._robot, revision, mover=mover)
             if drive is not self._drive:
                 return
             if fault is None:
                 if drive is not None and drive.legs:
                     await self._follow(drive)
             elif drive is not None:
-                await self._end(drive, GoalState.BLOCKED, fault)
+                await self._halt(drive, fault)
             else:
                 logger.warning("The robot is stopped: %s.", fault)
                 with anyio.CancelScope(shield=True):
@@ -240,16 +240,14 @@ class GuardedRobot:
         if drive is None:
             return
         fault = drive.goal_monitor.judge(revision, now_s=self.now_s)
-        if fault is not None and drive is self._drive:
+        if drive is not self._drive:
+            return
+        if fault is not None:
             await self._end(drive, GoalState.BLOCKED, fault)
+        elif drive.needs_legs(revision):
+            await self._lead(drive, revision)
 
     # --- inside ---
-
-    @property
-    def _mover(self) -> Mover:
-        if self._drive is not None:
-            return Mover.NAVIGATION
-        return Mover.VELOCITY if self.teleop.is_under_way else Mover.OTHERS
 
     def _take_up(self, robot_goal_id: str, plan: Plan, permit: Permit) -> None:
         """Begin to look after a drive that the robot has accepted."""
@@ -257,15 +255,16 @@ class GuardedRobot:
             replaced = GoalStatus(state=GoalState.PREEMPTED, cause=Cause(code=CauseCode.REPLACED))
             self._note_end(self._drive.goal_id, replaced)
         self._is_stop_owed = False
-        self._seen_at_s = anyio.current_time()
         first, *others = plan.legs
         self._monitor.begin_at(plan.here, now_s=self.now_s)
+        self._monitor.seen_at_s = anyio.current_time()
         self._drive = GuardedDrive(
             goal_id=robot_goal_id,
             leg_id=robot_goal_id,
             leg=first,
             legs=others,
             permit=permit,
+            map=plan.map,
             goal_monitor=GoalMonitor(goal=plan.legs[-1], radius_m=self.description.radius_m),
         )
         said = f", in {len(plan.legs)} legs round what is closed" if others else ""
@@ -274,6 +273,8 @@ class GuardedRobot:
     async def _follow(self, drive: GuardedDrive) -> GoalStatus:
         """Return how a drive stands, and send the robot on where a leg of it has ended."""
         async with self._stepping:
+            if drive.halted is not None and not drive.is_given_up:
+                return GoalStatus(state=GoalState.DRIVING)
             status = await self._robot.fetch_goal_status(drive.leg_id)
             if status.state is GoalState.ARRIVED and drive.legs and drive is self._drive:
                 further_m = drive.further_m
@@ -298,37 +299,46 @@ class GuardedRobot:
             await self._end(drive, GoalState.BLOCKED, cause)
             raise
         drive.leg, drive.legs = leg, drive.legs[1:]
-        if drive.verdict is not None:
+        if drive.is_given_up:
             with anyio.CancelScope(shield=True):
                 await self._stop("given up")
 
-    async def _find_fault(self, mover: Mover) -> Cause | None:
-        """Return why the robot must not go on; that nothing can be seen is a reason after a while.
+    async def _halt(self, drive: GuardedDrive, cause: Cause) -> None:
+        """Stop the robot before an area, to be led round it; end the drive for another reason."""
+        is_at_area = cause.code is CauseCode.NAVIGATION_AT_AREA and not drive.is_given_up
+        if not is_at_area or not drive.halt(cause, self._monitor.here):
+            await self._end(drive, GoalState.BLOCKED, cause)
+            return
+        logger.info("The robot is stopped, to be led round: %s.", cause)
+        self._is_stop_owed = True
+        with anyio.CancelScope(shield=True):
+            await self._repeat_stop()
+        self._guard.note_event("stop", str(cause), robot_s=self.now_s)
 
-        The blind robot is stopped only when we drive it: what others do with it is not known.
-        """
-        revision = self._reviser.latest
-        if revision is None or not revision.areas:
-            return None
-        try:
-            here = await self._robot.fetch_pose()
-        except LinkError as error:
-            blind_s = anyio.current_time() - self._seen_at_s
-            if mover is Mover.OTHERS or blind_s < BLIND_S:
-                return None
-            return Cause(code=CauseCode.POSE_UNKNOWN, after_s=blind_s, quote=str(error))
-        self._seen_at_s = anyio.current_time()
-        fault = self._monitor.judge(revision, here, now_s=self.now_s, mover=mover)
-        if fault is not None:
-            self._monitor.begin_at(here, now_s=self.now_s)
-        return fault
+    async def _lead(self, drive: GuardedDrive, revision: MapRevision) -> None:
+        """Send the robot the way that a drive takes on a map where other areas are closed."""
+        async with self._leading:
+            if drive is not self._drive or not drive.needs_legs(revision):
+                return
+            here = (await self._robot.fetch_pose()).pose.point
+            legs = await anyio.to_thread.run_sync(drive.plan_anew, revision, here)
+            if not legs and drive.halted is not None:
+                shut = replace(drive.halted, code=CauseCode.NO_WAY_ROUND)
+                await self._end(drive, GoalState.BLOCKED, shut)
+                return
+            async with self._stepping:
+                if drive is not self._drive or drive.is_given_up or self._is_stop_owed:
+                    return
+                drive.map = revision
+                if drive.halted is not None or [*legs] != [drive.leg, *drive.legs]:
+                    drive.legs, drive.halted = list(legs), None
+                    await self._send_on(drive)
 
     async def _end(self, drive: GuardedDrive, state: GoalState, cause: Cause) -> None:
         """Stop the robot and remember why, whatever its navigation will say of the drive."""
         drive.verdict = drive.verdict or GoalStatus(state=state, cause=cause)
         logger.warning("The robot is stopped: %s.", cause)
         with anyio.CancelScope(shield=True):
-            # If that fails it may still drive: the drive does not count as ended then.
             await self._stop(str(cause))
         self._note_end(drive.goal_id, drive.verdict)
 
@@ -357,22 +367,11 @@ class GuardedRobot:
         finally:
             self._guard.note_event("stop", why, robot_s=self.now_s)
 
-    def _latch(self) -> None:
-        """Hold the robot after a client's stop, where the policy says so."""
-        caller, at = current_caller(), self._guard.wall_clock()
-        if caller is NOBODY or not self._guard.policy.latches_on_stop:
-            return
-        try:
-            self._guard.hold.put(f"{caller.tool or 'a client'} stopped it", at=at)
-        except ConfigError as error:
-            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
-
     def _note_end(self, robot_goal_id: str, status: GoalStatus) -> None:
         drive = self._drive
         if drive is None or drive.goal_id != robot_goal_id or not status.state.is_final:
             return
         self._drive = None
-        # The robot knows legs by other ids: how the drive ended is known here alone.
         self._verdicts[robot_goal_id] = status
         while len(self._verdicts) > N_KEPT:
             self._verdicts.popitem(last=False)
@@ -380,7 +379,8 @@ class GuardedRobot:
         self._guard.note_end(drive.permit, said, robot_s=self.now_s)
 
     def _give_up_legs(self, drive: GuardedDrive, code: CauseCode) -> None:
-        """End a drive that was to go on after its present leg: its end is not the goal."""
+        """End a drive; where it was to go on after its present leg, its end is not the goal."""
+        drive.is_given_up = True
         if drive.legs:
             drive.legs = []
             status = GoalStatus(state=GoalState.CANCELLED, cause=Cause(code=code))

@@ -13,6 +13,8 @@ from mapspeak.robot import Cause, CauseCode, Robot, StampedPose
 from mapspeak.worldmodel.keepout import ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
+BLIND_S = 2.0
+"""Wall time without a pose after which a robot that must keep off some area is stopped."""
 OCCUPIED_FOR_S = 5.0
 """A person who walks over the goal does not spoil it."""
 REACTION_S = 0.2
@@ -74,16 +76,46 @@ class GoalMonitor:
 
 
 class KeepOutMonitor:
-    """Watches a robot, whatever moves it, for the closed areas ahead; judges what it is told."""
+    """Watches a robot, whatever moves it, for the closed areas ahead.
+
+    Attributes:
+        seen_at_s: When its pose was known last, in wall time.
+    """
 
     def __init__(self) -> None:
+        self.seen_at_s = -math.inf
         self._before: tuple[StampedPose, float] | None = None
         self._least_m: dict[ClosedArea, float] = {}
+
+    @property
+    def here(self) -> Point:
+        """Where the robot was at the last look."""
+        if self._before is None:
+            raise LinkError("The robot was not seen yet.", hint="Look again.")
+        return self._before[0].pose.point
 
     def begin_at(self, here: StampedPose, *, now_s: float) -> None:
         """Begin anew where the robot stands: what it came too near to before is forgotten."""
         self._before = (here, now_s)
         self._least_m = {}
+
+    async def look(self, robot: Robot, revision: MapRevision, *, mover: Mover) -> Cause | None:
+        """Return why a robot must not go on; that nothing can be seen is a reason after a while.
+
+        The blind robot is stopped only when we drive it: what others do with it is not known.
+        """
+        try:
+            here = await robot.fetch_pose()
+        except LinkError as error:
+            blind_s = anyio.current_time() - self.seen_at_s
+            if mover is Mover.OTHERS or blind_s < BLIND_S:
+                return None
+            return Cause(code=CauseCode.POSE_UNKNOWN, after_s=blind_s, quote=str(error))
+        self.seen_at_s = anyio.current_time()
+        fault = self.judge(revision, here, now_s=robot.now_s, mover=mover)
+        if fault is not None:
+            self.begin_at(here, now_s=robot.now_s)
+        return fault
 
     def judge(
         self, revision: MapRevision, stamped: StampedPose, *, now_s: float, mover: Mover

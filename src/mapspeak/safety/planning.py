@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import anyio.to_thread
@@ -11,7 +11,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
-from mapspeak.robot import GoalStatus, Robot, StampedPose
+from mapspeak.robot import Cause, GoalStatus, Robot, StampedPose
 from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, read_number, refuse
 from mapspeak.safety.guard import MapReviser, Permit
 from mapspeak.safety.monitor import KEEP_M, GoalMonitor, comes_too_near
@@ -28,6 +28,8 @@ SHORTEST_M = 0.5
 BOW_M = 1.0
 """A leg farther than this from all areas needs no second check: no robot strays that far."""
 AROUND_M = 2.0
+HALTED_AGAIN_M = 0.3
+"""A robot that is stopped again so near to where it was led on from does not follow."""
 
 
 def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...]:
@@ -51,6 +53,17 @@ def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...
     if expected is not None and _find_crossed(revision, expected) <= _find_crossed(revision, way):
         # The robot's own way is no worse than ours.
         return (goal,)
+    return _cut(revision, way, goal)
+
+
+def lead_round(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...]:
+    """Return the poses of the way to a goal for a robot that would go another; none without one."""
+    way = revision.find_path(here, goal.point)
+    return () if way is None else _cut(revision, way, goal)
+
+
+def _cut(revision: MapRevision, way: Path, goal: Pose) -> tuple[Pose, ...]:
+    """Return the corners of a way as poses, the goal last."""
     corners = _split(revision, _simplify(way.points))[1:-1]
     ends = [*corners[1:], goal.point]
     return (
@@ -143,6 +156,10 @@ class GuardedDrive:
     Attributes:
         goal_id: The id it is known by: that of its first leg.
         leg_id: What the robot calls the leg that it drives now.
+        map: What its legs were planned on.
+        halted: Why the robot was stopped; it is to be led round that.
+        halts: Where it was stopped so.
+        is_given_up: True when it must not be sent on.
         verdict: Why it was ended here; it counts once the robot has ended its leg.
     """
 
@@ -152,7 +169,37 @@ class GuardedDrive:
     leg: Pose
     permit: Permit
     goal_monitor: GoalMonitor
+    map: MapRevision
+    halted: Cause | None = None
+    halts: list[Point] = field(default_factory=list)
+    is_given_up: bool = False
     verdict: GoalStatus | None = None
+
+    @property
+    def goal(self) -> Pose:
+        """Where it ends."""
+        return [self.leg, *self.legs][-1]
+
+    def halt(self, cause: Cause, here: Point) -> bool:
+        """Note that the robot must stop here; false where it does not follow: it did so before."""
+        if self.halted is None:
+            if any(here.distance_to(each) < HALTED_AGAIN_M for each in self.halts):
+                return False
+            self.halts.append(here)
+            self.halted = cause
+        return True
+
+    def needs_legs(self, revision: MapRevision) -> bool:
+        """Return True where it must be planned anew."""
+        if self.is_given_up:
+            return False
+        was = (self.map.areas, self.map.hindrances)
+        return self.halted is not None or (revision.areas, revision.hindrances) != was
+
+    def plan_anew(self, revision: MapRevision, here: Point) -> tuple[Pose, ...]:
+        """Return the legs from here, the goal last; none where a stopped robot has no way."""
+        plan = plan_legs if self.halted is None else lead_round
+        return plan(revision, here, self.goal)
 
     @property
     def further_m(self) -> float:
@@ -183,6 +230,7 @@ class Plan:
     check: GoalCheck
     legs: tuple[Pose, ...]
     here: StampedPose
+    map: MapRevision
 
 
 class Planner:
@@ -219,7 +267,7 @@ class Planner:
         legs: tuple[Pose, ...] = (goal,)
         if check.is_ok and check.path_m:
             legs = await anyio.to_thread.run_sync(plan_legs, revision, here.pose.point, goal)
-        return Plan(check=check, legs=legs, here=here)
+        return Plan(check=check, legs=legs, here=here, map=revision)
 
     async def judge_message(self, message: Message) -> Refused | None:
         """Return what is against the goal of an action: each pose in it is held to the map.

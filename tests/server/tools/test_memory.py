@@ -559,7 +559,7 @@ async def test_a_closed_door_and_what_lies_behind_name_the_event(tmp_path: Path,
         door = text_of(await client.call_tool("describe_place", {"place": "D1"}))
         memory = text_of(await client.call_tool("check_memory", {}))
         inside = await client.call_tool("note_event", {**closed, "place": "R2"})
-    assert "cannot get to R1 from where it is" in noted
+    assert "cannot get to R1 from here" in noted
     assert "closed by event E1 until 14:00" in checked["reason"]
     assert "as wide as the robot" not in checked["reason"]
     assert "closed by event E1 until 14:00: no way for the robot" in door

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from datetime import datetime
+from enum import StrEnum
 
 import numpy as np
 
@@ -24,12 +25,13 @@ from mapspeak.spatial.rooms import Door, Region, RoomMap
 from mapspeak.worldmodel.keepout import (
     ClosedArea,
     Outline,
+    mask_areas,
     outline_around,
     outline_of_door,
     outlines_of_region,
 )
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.revision import Hindrance, MapRevision
+from mapspeak.worldmodel.revision import STEP_M, Hindrance, MapRevision
 
 SPOT_RADIUS_M = 0.5
 """An event at a point takes this much floor around it."""
@@ -66,7 +68,7 @@ def note_event(
     if until is not None and until <= now:
         raise SemanticMapError(
             f"The event '{text}' was over at {until.isoformat(timespec='minutes')}.",
-            hint="Give a time that is still to come, with its zone.",
+            hint=f"Give a time after {now.isoformat(timespec='minutes')}.",
         )
     _require_no_orders(event=text, place=place or "", source=source)
     found = None if place is None else find_place(world, place)
@@ -122,7 +124,7 @@ def find_cut_off(world: WorldModel, event: Event, now: datetime) -> list[str]:
     if area is None:
         return []
     before = world.distances.reachable
-    closed = world.map.with_areas((*world.map.areas, area), world.map.hindrances)
+    closed = _close(world.map, area)
     after = closed.distances_from(world.robot.point).reachable
     labels = world.rooms.labels
     return [
@@ -132,6 +134,39 @@ def find_cut_off(world: WorldModel, event: Event, now: datetime) -> list[str]:
         and np.count_nonzero(after & (labels == region.index))
         < REST_RATIO * np.count_nonzero(before & (labels == region.index))
     ]
+
+
+class OnWay(StrEnum):
+    """What a closure means for a drive under way."""
+
+    AT_GOAL = "at_goal"
+    LED_ROUND = "led_round"
+    NO_WAY_ROUND = "no_way_round"
+
+
+def find_on_way(world: WorldModel, event: Event, goal: Point, now: datetime) -> OnWay | None:
+    """Return what an event means for a drive to a goal; None where it leaves its way alone.
+
+    Args:
+        world: The map before the event, with the robot outside what it closes.
+    """
+    is_closed = event.effect is Effect.CLOSED and event.is_current(now)
+    area = _area_of(event, world.map, now) if is_closed else None
+    if area is None:
+        return None
+    if area.distance_to(goal) < world.map.radius_m:
+        return OnWay.AT_GOAL
+    here = world.robot.point
+    way, closed = world.map.find_path(here, goal), _close(world.map, area)
+    if way is None or not any(
+        area.distance_to(each) < world.map.radius_m for each in way.sampled(STEP_M)
+    ):
+        return None
+    return OnWay.NO_WAY_ROUND if closed.find_path(here, goal) is None else OnWay.LED_ROUND
+
+
+def _close(revision: MapRevision, area: ClosedArea) -> MapRevision:
+    return revision.with_areas((*revision.areas, area), revision.hindrances)
 
 
 def end_event(store: MemoryStore, event_id: str, *, now: datetime) -> Event:
@@ -152,8 +187,20 @@ def end_event(store: MemoryStore, event_id: str, *, now: datetime) -> Event:
             f"{event.id} had already ended, at {event.until.isoformat(timespec='minutes')}.",
             hint="Nothing was changed.",
         )
-    begins = None if event.begins is not None and event.begins >= now else event.begins
-    return store.write_event(replace(event, begins=begins, until=now, every=Every.ONCE))
+    # The memory keeps whole seconds.
+    ends = now.replace(microsecond=0)
+    begins = None if event.begins is not None and event.begins >= ends else event.begins
+    return store.write_event(replace(event, begins=begins, until=ends, every=Every.ONCE))
+
+
+def find_also_closed(revision: MapRevision, event: Event, now: datetime) -> list[ClosedArea]:
+    """Return what else closes floor that an event closes, or closed."""
+    area = _area_of(event, revision, now) if event.effect is Effect.CLOSED else None
+    if area is None:
+        return []
+    inside = mask_areas(revision.grid, [area])
+    others = (each for each in revision.areas if each.event_id != event.id)
+    return [each for each in others if (inside & mask_areas(revision.grid, [each])).any()]
 
 
 def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:

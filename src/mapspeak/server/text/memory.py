@@ -4,13 +4,20 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from datetime import datetime
 
+from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Confidence, Landmark, Merge, Reunion, SemanticMap, Waypoint
 from mapspeak.memory.consistency.findings import MemoryFinding
 from mapspeak.memory.events import Event
 from mapspeak.memory.frames import FrameId, Frames
 from mapspeak.memory.quoting import quote, quote_name, tell_name
-from mapspeak.places.recall.events import closes_robot_in, find_cut_off
+from mapspeak.places.recall.events import (
+    OnWay,
+    closes_robot_in,
+    find_also_closed,
+    find_cut_off,
+    find_on_way,
+)
 from mapspeak.server.text.episodes import OBSERVED
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.offered import lead
@@ -121,14 +128,29 @@ def _say_finding(finding: MemoryFinding) -> str:
     return f"{finding.kind.replace('_', ' ')}: {say_finding(finding)}"
 
 
-def say_consequences(world: WorldModel, event: Event, now: datetime) -> str:
-    """Say what an event that closes floor means for the robot, where it stands now."""
+ON_WAY = {
+    OnWay.AT_GOAL: "{} ends: its goal lies there.",
+    OnWay.LED_ROUND: "{} is led round it.",
+    OnWay.NO_WAY_ROUND: "{} has no way round and ends before it.",
+}
+
+
+def say_consequences(world: WorldModel, event: Event, now: datetime, drive: Drive | None) -> str:
+    """Say what an event that closes floor means for the robot, where it stands or drives now."""
     if closes_robot_in(world, event, now):
         return "The robot stands inside: it has to drive out before that begins."
-    cut_off = find_cut_off(world, event, now)
-    if not cut_off:
-        return ""
-    return f"While it lasts the robot cannot get to {', '.join(cut_off)} from where it is."
+    told, cut_off = [say_also_closed(world, event, now)], find_cut_off(world, event, now)
+    if drive is not None and (means := find_on_way(world, event, drive.goal.point, now)):
+        told.append(ON_WAY[means].format(f"{drive.goal_id} to {drive.place}"))
+    if cut_off:
+        told.append(f"While it lasts the robot cannot get to {', '.join(cut_off)} from here.")
+    return " ".join(filter(None, told))
+
+
+def say_also_closed(world: WorldModel, event: Event, now: datetime) -> str:
+    """Say what else closes the place of an event; empty where nothing does."""
+    titles = [f"the {each.title}" for each in find_also_closed(world.map, event, now)]
+    return f"Closed there, too: {' and '.join(titles)}." if titles else ""
 
 
 MOVED_M = 0.05

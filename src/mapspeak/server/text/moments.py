@@ -7,7 +7,7 @@ from types import MappingProxyType
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import read_local, show_local
 
-AHEAD = "2026-11-20T09:30, 09:30, 3 pm, tomorrow 8:00, in 2h, now"
+AHEAD = "2026-11-20T09:30, 09:30, tomorrow 8:00, today, tonight, in 2h, now"
 PAST = "2026-11-20, 2026-11-20T09:30, 09:30, 2h ago, last 10 min, yesterday, this morning, Monday"
 """What schemas and hints say that can be written; all of it is read."""
 
@@ -96,12 +96,18 @@ def read_coming(
 ) -> tuple[datetime | None, datetime | None]:
     """Return from when to when, of what is to come; of 22:00 to 06:00 the second is the next day.
 
+    Of a period that has begun, such as "today", the second is its end.
+
     Raises:
         SemanticMapError: As `read_moment`.
     """
     start = read_moment(begins, now)
     after = start if start is not None and _is_clock(ends) else now
-    return start, read_moment(ends, after)
+    period = _read_period(ends, after, is_ahead=True)
+    if period is None:
+        return start, None
+    has_begun = period[0] <= max(now, start or now)
+    return start, (period[1] if has_begun and period[1] is not None else period[0])
 
 
 def _read_period(

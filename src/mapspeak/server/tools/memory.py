@@ -31,6 +31,7 @@ from mapspeak.server.text.episodes import describe_episodes, describe_nearby, sa
 from mapspeak.server.text.findings import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     describe_check,
+    say_also_closed,
     say_consequences,
 )
 from mapspeak.server.text.moments import AHEAD, PAST, read_coming, read_past
@@ -264,16 +265,17 @@ class MemoryTools:
             )
             said = event.sentence(now)
             fault = self._keep_note(world, f"Noted {said}")
-            told = (said, say_consequences(world, event, now), fault)
+            drive = session.drives.under_way
+            told = (said, say_consequences(world, event, now, drive), fault)
             return " ".join(filter(None, told))
 
         return f"Noted as {await session.compute(note)}"
 
     @tool("End an event", ToolEffect.REMEMBERS)
     async def end_event(self, event: EventId) -> str:
-        """End an event at once; ways lead through its place again.
+        """End an event at once; ways lead through its place where nothing else closes it.
 
-        Use it when what was noted is over. What policies close stays closed.
+        Use it when what was noted is over.
         """
         session, now = self._session, self._read_calendar()
         ended = await session.compute(lambda: events.end_event(session.memory, event, now=now))
@@ -283,8 +285,12 @@ class MemoryTools:
         except (LinkError, MapError):
             # It has ended all the same; only where the robot stood then is not known.
             return f"Ended: {said}"
-        fault = await session.compute(lambda: self._keep_note(world, f"Ended {said}"))
-        return " ".join(filter(None, (f"Ended: {said}", fault)))
+
+        def tell() -> str:
+            fault = self._keep_note(world, f"Ended {said}")
+            return " ".join(filter(None, (said, say_also_closed(world, ended, now), fault)))
+
+        return f"Ended: {await session.compute(tell)}"
 
     @tool("Forget a place or thing", ToolEffect.REMEMBERS)
     async def forget(self, what: What, undo: Undo = False) -> str:  # noqa: FBT002 - a flag of the call

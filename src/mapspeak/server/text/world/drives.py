@@ -67,7 +67,10 @@ WORDS = {
     ),
     CauseCode.NAVIGATION_AT_AREA: (
         "The robot was stopped {distance_m:.2f} m before the {name}: its own navigation was about "
-        "to drive into it. Lead it round by goals on the way."
+        "to drive into it, though it was led round."
+    ),
+    CauseCode.NO_WAY_ROUND: (
+        "The robot was stopped {distance_m:.2f} m before the {name}: no known way leads round."
     ),
     CauseCode.VELOCITY_AT_AREA: (
         "The robot was stopped {distance_m:.2f} m before the {name}: a published velocity was "
