@@ -44,7 +44,7 @@ def say_cause(error: Exception) -> str:
 
 def say_nearest(name: str, known: Iterable[str]) -> str:
     """Return a question with the known name that is most like another; empty if none is."""
-    near = difflib.get_close_matches(name, list(known), n=1)
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.7)
     return f"Did you mean {near[0]}? " if near else ""
 
 

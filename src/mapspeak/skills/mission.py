@@ -65,6 +65,7 @@ class MissionBounds:
     """The bounds of a mission.
 
     Attributes:
+        n_commands: The steps that do more than drive and read.
         asked: The skills in it for which a person is asked each time.
         parts: The missions within it, as they were when it was checked.
     """
@@ -180,7 +181,7 @@ class MissionDesk:
             return inner + MissionBounds(asked=asked, parts={spec.name: skill})
         drives = step.skill in DRIVING
         is_free = (spec.effect is SkillEffect.READS or drives) and not asked
-        return MissionBounds(int(drives), 0 if is_free else 2, asked)
+        return MissionBounds(int(drives), int(not is_free), asked)
 
     def open(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
         """Return the mission that is written in an entry.
@@ -309,7 +310,8 @@ def _scope_of(mission: Mission, given: Arguments, bounds: MissionBounds) -> Appr
         f"({told}{asked}; {_digest(mission, given, bounds.parts)})",
         n_drives=bounds.n_drives,
         duration_s=mission.spec.timeout_s,
-        n_commands=bounds.n_commands + 1,
+        # A skill that calls an interface of the robot is a command, and its call another one.
+        n_commands=2 * bounds.n_commands + 1,
     )
 
 

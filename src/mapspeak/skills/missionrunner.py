@@ -11,7 +11,7 @@ from anyio.abc import TaskGroup
 from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Parallel, Selector, Sequence
-from py_trees.decorators import FailureIsSuccess, Repeat, Retry
+from py_trees.decorators import Decorator, FailureIsSuccess, Repeat, Retry
 
 from mapspeak.errors import MapspeakError
 from mapspeak.skill import (
@@ -138,14 +138,14 @@ class MissionRunner:
             outcome = await skill.run(given, partial(self._take_progress, step))
         except anyio.get_cancelled_exc_class():
             self.states[step.number] = SkillState.CANCELLED
-            self._note(f"{step.number} {step.skill}: cut off")
+            self.note(f"{step.number} {step.skill}: cut off")
             raise
         except MapspeakError as error:
             outcome = failed(SkillCode.REJECTED, error.message)
         self.states[step.number] = outcome.state
         if step.output:
             self._values[step.output] = {**outcome.outputs, "ended": str(outcome.state)}
-        self._note(_say_end(step, outcome))
+        self.note(_say_end(step, outcome))
         if outcome.state is SkillState.SUCCEEDED:
             return True
         self._last = outcome
@@ -174,8 +174,11 @@ class MissionRunner:
 
     # --- what is told ---
 
-    def _note(self, said: str) -> None:
-        self._account.append(said)
+    def note(self, said: str) -> None:
+        """Tell and keep what was done, with the time by the operator's clock, else the robot's."""
+        at = self.facts.read_calendar()
+        time = f"{self.facts.now_s:.0f} s" if at is None else f"{at:%H:%M:%S}"
+        self._account.append(f"{time} {said}")
         self.on_step(said)
         self._tell(now="")
 
@@ -214,9 +217,8 @@ class MissionRunner:
                 node = Parallel(name, ONE(), children=[parts[0], expiring])
             case StepKind.EVERY:
                 pacing = _Work(name, self._pace(step.limit * 60), self)
-                in_any_case = FailureIsSuccess(name, parts[0])
-                once = Sequence(name, memory=True, children=[pacing, in_any_case])
-                node = Repeat(name, once, step.times)
+                once = Sequence(name, memory=True, children=[pacing, *parts])
+                node = Repeat(name, _Round(name, once, step.times, self.note), step.times)
             case StepKind.UNTIL:
                 in_any_case = FailureIsSuccess(name, parts[0])
                 once = Sequence(name, memory=True, children=[in_any_case, parts[1]])
@@ -233,6 +235,32 @@ def _say_end(step: Step, outcome: SkillOutcome) -> str:
     if outcome.quote:
         said += f' "{outcome.quote[:120]}"'
     return said[:MOST_LINE]
+
+
+class _Round(Decorator):
+    """A round of several, which all take place; the last one fails where none has succeeded."""
+
+    def __init__(
+        self, name: str, child: Behaviour, n_rounds: int, note: Callable[[str], None]
+    ) -> None:
+        super().__init__(name, child)
+        self._n_rounds, self._note = n_rounds, note
+        self._n_done = self._n_good = 0
+
+    def update(self) -> Status:
+        if (status := self.decorated.status) is Status.RUNNING:
+            return status
+        self._n_done += 1
+        self._n_good += status is Status.SUCCESS
+        if self._n_done < self._n_rounds:
+            return Status.SUCCESS
+        n_good, self._n_done, self._n_good = self._n_good, 0, 0
+        self._note(f"{self.name}: {n_good} of {self._n_rounds} rounds did all their steps")
+        return Status.SUCCESS if n_good else Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status is Status.INVALID:
+            self._n_done = self._n_good = 0
 
 
 class _Work(Behaviour):

@@ -89,7 +89,7 @@ async def test_a_service_is_called_with_what_the_owner_allows(
         lied = await caller.ask("light_off")
         missing = await caller.refuse("gone")
     assert asked == [True, False]
-    assert "what counts as success did not hold" in lied
+    assert "condition of success did not hold" in lied
     assert "/not/there" in missing
 
 

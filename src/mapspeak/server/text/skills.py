@@ -32,7 +32,7 @@ CODES = {
     SkillCode.LOST: "How it ended is not known: look at the robot, then run it again.",
     SkillCode.NOT_ANSWERED: "Nothing came in time.",
     SkillCode.PRECONDITION: "It was not begun.",
-    SkillCode.NOT_ACHIEVED: "It ended, but what counts as success did not hold.",
+    SkillCode.NOT_ACHIEVED: "It ended, but its condition of success did not hold.",
 }
 GOES_ON = "It goes on. {skill_status} waits for it. {cancel_skill} ends it."
 HEADS = {
@@ -98,11 +98,9 @@ def say_mission(mission: Mission, bounds: MissionBounds) -> str:
 def say_bounds(mission: Mission, bounds: MissionBounds) -> str:
     """Return what a mission may do at most, and what people said about those within it."""
     asked = f" A person is asked for {', '.join(sorted(bounds.asked))}." if bounds.asked else ""
-    told = (
-        f"At most {say_count(bounds.n_drives, 'drive')} and "
-        f"{say_count(bounds.n_commands, 'other command')} "
-        f"within {mission.spec.timeout_s / 60:g} min.{asked}"
-    )
+    counts = ((bounds.n_drives, "drive"), (bounds.n_commands, "other command"))
+    does = " and ".join(say_count(n, what) for n, what in counts if n) or "0 drives"
+    told = f"At most {does} within {mission.spec.timeout_s / 60:g} min.{asked}"
     return "\n".join(filter(None, [told, say_remark(*bounds.parts.values())]))
 
 

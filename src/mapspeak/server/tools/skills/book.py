@@ -32,6 +32,7 @@ class SkillBook:
         entries: Of the owner's skills.yaml.
 
     Attributes:
+        session: The same.
         questions: Those that missions ask.
         desk: Runs missions.
         folder: Where missions are saved.
@@ -42,7 +43,7 @@ class SkillBook:
     def __init__(
         self, session: Session, ros: RosAccess, entries: Sequence[OwnersEntry] = ()
     ) -> None:
-        self._ros = ros
+        self._ros, self.session = ros, session
         self._board: SkillBoard | None = None
         self.questions = QuestionBook()
         self.folder = memory_folder(session.memory.path) / "missions"

@@ -45,6 +45,8 @@ NUMBER, TEXT, LIST = ParameterKind.NUMBER, ParameterKind.TEXT, ParameterKind.LIS
 READS, MOVES = SkillEffect.READS, SkillEffect.MOVES
 WHERE = "an id, a remembered name, a phrase, or x, y"
 AHEAD = "ahead"
+PLACES = ("place", "in_room", "near")
+"""The arguments of built-in skills that name a place."""
 ANSWER = SkillParameter("", TEXT, most=80)
 ENDS = {
     GoalState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
@@ -232,6 +234,9 @@ ASK = _spec(
     _within(300.0),
     SkillParameter("picture", TEXT, description="its id; the latest if left out", most=40),
 )
+
+
+BUILT_IN = frozenset(each.name for each in (DRIVE, LOOK, NOTE, CHECK, WAIT_FOR, WAIT, ASK))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,13 +1,16 @@
 """The tools of missions: run, answer, save, show, forget."""
 
 import re
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context, Image
 from pydantic import Field, WithJsonSchema
 
-from mapspeak.errors import SkillError
+from mapspeak.errors import GoalError, LinkError, MapError, SkillError
+from mapspeak.places.relations.choosing import find_place
 from mapspeak.safety import current_caller
 from mapspeak.server.text.skills import (
     say_bounds,
@@ -19,9 +22,10 @@ from mapspeak.server.text.skills import (
 from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.skills.board import say_run, tell_news
 from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.skill import JsonValue, ParameterKind, SkillSpec
-from mapspeak.skills.mission import Mission
+from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
+from mapspeak.skills.mission import Mission, MissionBounds
 from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
@@ -32,7 +36,8 @@ from mapspeak.skills.skillsfile import (
     set_aside,
     write_skills,
 )
-from mapspeak.skills.steps import parse_tree
+from mapspeak.skills.steps import StepKind, fill_in, find_names, parse_tree
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_ARGUMENTS = 20
 Tree = Annotated[Any, WithJsonSchema({"type": "string", "description": "YAML or JSON"})]
@@ -107,7 +112,7 @@ class MissionTools:
         else:
             mission = self._find_saved(name)
         given = read_values(mission.spec, values or [])
-        bounds = self._book.desk.check(mission)
+        bounds = await self._check(mission, given)
         run = await self._runs.begin(mission, given, wait_s=wait_s, on_news=tell_news(context))
         return f"{say_bounds(mission, bounds)}\n{say_run(run, self._book.questions)}"
 
@@ -149,10 +154,13 @@ class MissionTools:
             if not correction or path is None:
                 raise SkillError("Nothing is to be saved.", hint="Give a tree, or a correction.")
             add_correction(path, name, correction)
+            told = "Its steps are as before: save a tree that does it, where one can."
         else:
             book.load_saved()
             book.check_free(name)
-            kept = book.saved[name].remember if name in book.saved else ()
+            before = book.saved.get(name)
+            kept = () if before is None else before.remember
+            sentence = sentence or ("" if before is None else before.spec.description)
             written = {
                 "name": name,
                 "sentence": sentence,
@@ -161,11 +169,12 @@ class MissionTools:
                 "mission": _read(tree),
                 "remember": [*kept, *([correction] if correction else [])],
             }
-            book.desk.check(book.desk.open(OwnersEntry.model_validate(written)))
+            await self._check(book.desk.open(OwnersEntry.model_validate(written)), {})
             self._check_file(path := book.folder / f"{name}.yaml", name)
-            told = {key: each for key, each in written.items() if each not in ("", [])}
-            write_skills(path, {"skills": [told]})
-        return f"Saved {name} in {path}.\n{self._show(name)}"
+            filled = {key: each for key, each in written.items() if each not in ("", [])}
+            write_skills(path, {"skills": [filled]})
+            told = ""
+        return "\n".join(filter(None, (f"Saved {name} in {path}.", told, self._show(name))))
 
     @tool("Show missions and skills", ToolEffect.READS)
     async def show_missions(self, name: SavedName = None) -> str:
@@ -185,6 +194,36 @@ class MissionTools:
             path = set_aside(path)
         self._book.load_saved()
         return f"{name} is forgotten; its file is kept as {path}."
+
+    async def _check(self, mission: Mission, given: Arguments) -> MissionBounds:
+        """Return what a mission can do at most; refuse places that are not there.
+
+        Raises:
+            SkillError: It has a mistake.
+        """
+        bounds, session = self._book.desk.check(mission), self._book.session
+        with suppress(LinkError, MapError):
+            world = await session.fetch_world_model()
+            parts = ((mission, given), *((part, {}) for part in bounds.parts.values()))
+            for each, values in parts:
+                await session.compute(partial(self._check_places, world, each, values))
+        return bounds
+
+    def _check_places(self, world: WorldModel, mission: Mission, given: Arguments) -> None:
+        for step in mission.tree.walk():
+            if step.kind is not StepKind.LEAF:
+                continue
+            if step.skill not in BUILT_IN:
+                # What the robot's own skills do is not known: they may learn places.
+                return
+            named = step.name_arguments(self._book.find(step.skill).spec)
+            for place in (named[key] for key in PLACES if key in named):
+                if find_names(place) <= given.keys() and (asked := fill_in(place, given)) != AHEAD:
+                    try:
+                        find_place(world, str(asked))
+                    except GoalError as error:
+                        said = f"Step {step.number} ({step.skill}): {error.message}"
+                        raise SkillError(said, hint=error.hint) from error
 
     def _check_file(self, path: Path, name: str) -> None:
         """Check that a file is all of one mission, and a mission in no other file.
