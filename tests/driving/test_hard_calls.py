@@ -14,7 +14,8 @@ from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import Bounds, ExplorationState
-from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
+from mapspeak.driving.routes.following import RouteBook, RouteState
+from mapspeak.driving.routes.planning import WhenBlocked
 from mapspeak.driving.search.progress import Budget, SearchState
 from mapspeak.driving.search.searcher import Judgement, Searcher
 from mapspeak.errors import LinkError

@@ -4,6 +4,7 @@ import pytest
 from mcp.client import Client
 
 from fakes import SPEED_MPS, FakeRobot, two_rooms
+from guarding import make_guard
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
 from served import connect, pictures_of, report_of, text_of
@@ -310,3 +311,26 @@ async def test_an_end_that_nobody_knows_is_an_error_before_anything_moves(tmp_pa
     assert result.is_error
     assert "R77" in text_of(result)
     assert not robot.goals
+
+
+@pytest.mark.parametrize("drive", [True, False])
+async def test_a_stop_behind_a_closure_is_skipped_from_the_plan_on(
+    tmp_path: Path,
+    drive: bool,  # noqa: FBT001 - a parameter of pytest
+) -> None:
+    robot, toolsets = FakeRobot(two_rooms()), (*TOOLSETS, "memory")
+    async with connect(robot, tmp_path, toolsets=toolsets, guard=make_guard(tmp_path)) as client:
+        shut = {"text": "locked", "place": "D1", "effect": "closed"}
+        await client.call_tool("note_event", shut)
+        call = {"stops": ["1.2, 1.4", "R1", "R2"], "when_blocked": "skip", "drive": drive}
+        answer = report_of(await client.call_tool("follow_route", call))
+        none = await client.call_tool("follow_route", {**call, "stops": ["R1"]})
+        unknown = await client.call_tool("follow_route", {**call, "stops": ["kitchen", "R2"]})
+        waits = await client.call_tool("follow_route", {**call, "when_blocked": "wait"})
+    assert answer["state"] == ("done" if drive else "planned")
+    assert len(answer["skipped"]) == 1
+    assert answer["skipped"][0].startswith("R1")
+    assert "closed by event E1" in answer["skipped"][0]
+    assert "No stop can be reached" in text_of(none)
+    assert "Stop 1" in text_of(unknown)
+    assert "Stop 2" in text_of(waits)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 
 import anyio
 
@@ -15,7 +16,7 @@ from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.trips import TripContext
 from mapspeak.driving.routes.ordering import RouteOrder
-from mapspeak.driving.routes.planning import RoutePlan, StopState, plan_route
+from mapspeak.driving.routes.planning import RoutePlan, StopState, WhenBlocked, plan_route
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, check_goal
@@ -37,13 +38,6 @@ class RouteState(StrEnum):
     BLOCKED = "blocked"
     INTERRUPTED = "interrupted"
     DONE = "done"
-
-
-class WhenBlocked(StrEnum):
-    """What becomes of a route when a stop cannot be reached."""
-
-    WAIT = "wait"
-    SKIP = "skip"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +86,7 @@ class RouteBook:
         is_looking: bool,
         order: RouteOrder = RouteOrder.AS_GIVEN,
         end_at: str | None = None,
+        when_blocked: WhenBlocked = WhenBlocked.WAIT,
     ) -> RoutePlan:
         """Plan a route that takes the place of the one before, and return it.
 
@@ -103,7 +98,7 @@ class RouteBook:
         Raises:
             GoalError: There is no such place, or no way there.
         """
-        plan = await self._plan_route(stops, order, end_at)
+        plan = await self._plan_route(stops, order, end_at, when_blocked)
         async with self._advancing:
             await self._give_up()
             self._plan = plan
@@ -111,14 +106,20 @@ class RouteBook:
         return plan
 
     async def plan(
-        self, stops: Sequence[str], *, pause_s: float, order: RouteOrder, end_at: str | None
+        self,
+        stops: Sequence[str],
+        *,
+        pause_s: float,
+        order: RouteOrder,
+        end_at: str | None,
+        when_blocked: WhenBlocked,
     ) -> RouteProgress:
         """Return a route as planned; the robot and the route it follows stay as they are.
 
         Raises:
             GoalError: There is no such place, or no way there.
         """
-        plan = await self._plan_route(stops, order, end_at)
+        plan = await self._plan_route(stops, order, end_at, when_blocked)
         here = await self._site.robot.fetch_pose()
         return RouteProgress(
             state=RouteState.PLANNED,
@@ -129,12 +130,15 @@ class RouteBook:
         )
 
     async def _plan_route(
-        self, stops: Sequence[str], order: RouteOrder, end_at: str | None
+        self,
+        stops: Sequence[str],
+        order: RouteOrder,
+        end_at: str | None,
+        when_blocked: WhenBlocked,
     ) -> RoutePlan:
         world = await self._site.fetch_world_model()
-        return await self._site.compute(
-            lambda: plan_route(world, stops, order=order, end_at=end_at)
-        )
+        plan = partial(plan_route, order=order, end_at=end_at, when_blocked=when_blocked)
+        return await self._site.compute(partial(plan, world, stops))
 
     def _estimate_s(self, plan: RoutePlan, pause_s: float) -> float | None:
         pace_mps = self._site.drives.odometer.pace_mps

@@ -97,6 +97,13 @@ Asked = tuple[str, tuple[CheckedGoal, ...]]
 """The words of a stop, and all that they may mean."""
 
 
+class WhenBlocked(StrEnum):
+    """What becomes of a route when a stop cannot be reached."""
+
+    WAIT = "wait"
+    SKIP = "skip"
+
+
 class StopState(StrEnum):
     """How it stands with one stop."""
 
@@ -151,6 +158,7 @@ def plan_route(
     *,
     order: RouteOrder = RouteOrder.AS_GIVEN,
     end_at: str | None = None,
+    when_blocked: WhenBlocked = WhenBlocked.WAIT,
 ) -> RoutePlan:
     """Plan a route past stops, each an id, a name, "x, y" or other words.
 
@@ -159,6 +167,7 @@ def plan_route(
     Args:
         order: Whether the stops are driven past as they are given, or on the shortest way.
         end_at: A last stop, whatever the order; "start" is where the robot is now.
+        when_blocked: Whether a stop that cannot be reached now is left out.
 
     Raises:
         GoalError: There are no stops or too many, one means nothing that can be reached, or no way
@@ -166,7 +175,7 @@ def plan_route(
     """
     _require_number(len(stops))
     legs_m = _Legs(world)
-    asked, left_out = _spread(world, legs_m, stops)
+    asked, left_out = _spread(world, legs_m, stops, when_blocked)
     as_given_m = math.fsum(legs_m.along(_choose_shortest(legs_m, asked)))
     last = [] if end_at is None else [_find_end(world, end_at)]
     _require_number(len(asked) + len(last))
@@ -196,23 +205,42 @@ def _require_number(n_stops: int) -> None:
 
 
 def _spread(
-    world: WorldModel, legs_m: "_Legs", stops: Sequence[str]
+    world: WorldModel, legs_m: "_Legs", stops: Sequence[str], when_blocked: WhenBlocked
 ) -> tuple[list[Asked], tuple[RouteStop, ...]]:
-    """Return each stop with its candidates, and the places of groups that cannot be reached."""
+    """Return each stop with its candidates, and what is left out as it cannot be reached."""
     asked: list[Asked] = []
     left_out: list[RouteStop] = []
     for number, words in enumerate(stops):
         group = [check_place(world, place) for place in find_group(world, words)]
         ahead = [goal for goal in group if goal.check.is_ok]
         if not ahead:
-            asked.append((words, _find(world, number, words)))
+            shut = _find_shut(world, words) if when_blocked is WhenBlocked.SKIP else None
+            if shut is None:
+                asked.append((words, _find(world, number, words)))
+            else:
+                left_out.append(_leave_out(shut))
             continue
         left_out += [_leave_out(goal) for goal in group if not goal.check.is_ok]
         way = asked[-1][1][:1] if asked else ()
         table = legs_m.table(way, ahead)
         shortest = order_shortest(table, is_end_fixed=False)
         asked += [(ahead[index].name, (ahead[index],)) for index in shortest]
+    if left_out and not asked:
+        shut = left_out[0].goal
+        raise GoalError(
+            f"No stop can be reached. {say_refusal(shut.name, shut.check)}",
+            hint="Choose other stops, or wait until there is a way.",
+        )
     return asked, tuple(left_out)
+
+
+def _find_shut(world: WorldModel, words: str) -> CheckedGoal | None:
+    """Return the place that words mean where the robot cannot get to it now."""
+    try:
+        goals = [check_place(world, place) for place in _find_places(world, words)]
+    except GoalError:
+        return None
+    return None if any(goal.check.is_ok for goal in goals) else goals[0]
 
 
 def _reorder(legs_m: "_Legs", asked: list[Asked], *, is_end_fixed: bool) -> list[Asked]:

@@ -11,10 +11,9 @@ from mapspeak.driving.routes.following import (
     RouteBook,
     RouteProgress,
     RouteState,
-    WhenBlocked,
 )
 from mapspeak.driving.routes.ordering import RouteOrder
-from mapspeak.driving.routes.planning import RoutePlan
+from mapspeak.driving.routes.planning import RoutePlan, WhenBlocked
 from mapspeak.errors import GoalError
 from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import RouteAnswer
@@ -101,7 +100,11 @@ class RouteTools:
         """
         if not drive:
             progress = await self._routes.plan(
-                _require(stops), pause_s=pause_s, order=order, end_at=end_at
+                _require(stops),
+                pause_s=pause_s,
+                order=order,
+                end_at=end_at,
+                when_blocked=when_blocked,
             )
             return _answer(progress)
         if stops is not None:
@@ -111,6 +114,7 @@ class RouteTools:
                 is_looking=look or look_around,
                 order=order,
                 end_at=end_at,
+                when_blocked=when_blocked,
             )
             self._looks_around = look_around
             self._scope = _scope_of(stops, plan, looks_around=look_around)

@@ -141,7 +141,8 @@ def say_on_the_way(drive: Drive) -> str:
 def say_route(progress: RouteProgress) -> str:
     """Say why a call of a route ended as it did."""
     if progress.state is RouteState.DONE:
-        n_skipped = sum(stop.state is StopState.SKIPPED for stop in progress.plan.stops)
+        stops = (*progress.plan.stops, *progress.plan.left_out)
+        n_skipped = sum(stop.state is StopState.SKIPPED for stop in stops)
         left_out = f", {n_skipped} of them left out" if n_skipped else ""
         return f"No stop is left{left_out}."
     if progress.state is RouteState.PLANNED:
