@@ -175,7 +175,7 @@ def test_a_file_that_names_a_function_is_not_obeyed(name: str) -> None:
     module, _, function = name.rpartition(".")
     told = f"c{module}\n{function}\n(S'x'\ntR.".encode()
     with pytest.raises(pickle.UnpicklingError):
-        PlainReader(memoryview(told), {}).load()
+        PlainReader(memoryview(told), ()).load()
 
 
 def test_things_that_cannot_be_kept_are_used_all_the_same(tmp_path: Path) -> None:

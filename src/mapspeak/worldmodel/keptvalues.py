@@ -1,9 +1,10 @@
 """What a large memory was made into, kept beside it, so that a later session need not make it.
 
 A file is a pickle with its arrays behind it, which are mapped into memory and read when needed:
-all of one type in a row, for there may be a hundred thousand. It only stands for what was made
-earlier: what it holds is compared with the present records and map. Reading it makes plain values
-of mapspeak and arrays, and the indexes named here; it calls nothing.
+all of one type and shape in a row, for there may be a hundred thousand, and those that are read
+together are of one shape. It only stands for what was made earlier: what it holds is compared with
+the present records and map. Reading it makes plain values of mapspeak and arrays, and the indexes
+named here; it calls nothing.
 """
 
 import contextlib
@@ -11,13 +12,13 @@ import gc
 import hashlib
 import io
 import json
+import math
 import mmap
 import os
 import pickle
 import struct
 import zlib
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache, partial
@@ -69,8 +70,7 @@ def keep_value(path: Path, value: object) -> None:
     told = io.BytesIO()
     writer = _PlainWriter(told, protocol=5)
     writer.dump(value)
-    rows = {kind: sum(each.nbytes for each in row) for kind, row in writer.rows.items()}
-    types = json.dumps(rows).encode()
+    types = json.dumps([(*kind, len(row)) for kind, row in writer.rows.items()]).encode()
     content = types + told.getbuffer()
     gap = bytes(-(_HEAD.size + len(content)) % _ALIGNED)
     head = _HEAD.pack(_digest_code(), zlib.crc32(content), len(types), len(content) - len(types))
@@ -101,9 +101,11 @@ def load_value(path: Path, kind: type[Kept], *, vectors: TextVectors | None = No
         begin, end = _HEAD.size + n_types, _HEAD.size + n_types + n_told
         if code != _digest_code() or zlib.crc32(content[_HEAD.size : end]) != checksum:
             return None
-        rows, start = {}, end + -end % _ALIGNED
-        for each, n_bytes in json.loads(bytes(content[_HEAD.size : begin])).items():
-            rows[each] = np.frombuffer(content[start : start + n_bytes], dtype=each)
+        rows, start = [], end + -end % _ALIGNED
+        for kind_of_array, shape, n in json.loads(bytes(content[_HEAD.size : begin])):
+            n_bytes = n * math.prod(shape) * np.dtype(kind_of_array).itemsize
+            row = np.frombuffer(content[start : start + n_bytes], dtype=kind_of_array)
+            rows.append(row.reshape(n, *shape))
             start += n_bytes
         if start != len(content):
             return None
@@ -134,22 +136,24 @@ class _PlainWriter(pickle.Pickler):
     """Writes a value as its class and its fields, and vectors of texts as the model's name.
 
     Attributes:
-        rows: The arrays of each type, which are written behind the pickle.
+        rows: The arrays of each type and shape, which are written behind the pickle.
     """
 
     def __init__(self, told: io.BytesIO, *, protocol: int) -> None:
         super().__init__(told, protocol=protocol)
-        self.rows: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
-        self._n: Counter[str] = Counter()
+        self.rows: dict[tuple[str, tuple[int, ...]], list[NDArray[Any]]] = {}
+        self._number_of: dict[tuple[str, tuple[int, ...]], int] = {}
 
     def reducer_override(self, value: Any) -> Any:  # noqa: ANN401 - as pickle declares it
         """Return how a value is made again."""
         if isinstance(value, np.ndarray):
-            kind = value.dtype.str
-            start = self._n[kind]
-            self._n[kind] += value.size
-            self.rows[kind].append(np.ascontiguousarray(value))
-            return cut_array, (kind, start, self._n[kind], value.shape)
+            kind = value.dtype.str, value.shape
+            row = self.rows.setdefault(kind, [])
+            row.append(np.ascontiguousarray(value))
+            return find_array, (
+                self._number_of.setdefault(kind, len(self._number_of)),
+                len(row) - 1,
+            )
         if isinstance(value, TextVectors):
             return TextVectors, (value.embedder.name,)
         if not isinstance(value, type) and _is_slotted(type(value)):
@@ -163,13 +167,13 @@ class PlainReader(pickle.Unpickler):
     def __init__(
         self,
         told: memoryview,
-        rows: Mapping[str, NDArray[Any]],
+        rows: Sequence[NDArray[Any]],
         *,
         vectors: TextVectors | None = None,
     ) -> None:
         super().__init__(io.BytesIO(told))
         self._vectors = vectors
-        self._cut_array = partial(cut_array, rows)
+        self._find_array = partial(find_array, rows)
 
     def find_class(self, module: str, name: str) -> object:
         """Return what makes values of a name; raise UnpicklingError where it is no plain value."""
@@ -180,8 +184,8 @@ class PlainReader(pickle.Unpickler):
             return super().find_class(module, name)
         if (module, name) == (TextVectors.__module__, TextVectors.__name__):
             return self._find_vectors
-        if (module, name) == (__name__, cut_array.__name__):
-            return self._cut_array
+        if (module, name) == (__name__, find_array.__name__):
+            return self._find_array
         found: object = super().find_class(module, name)
         is_index = name in _INDEXES.get(rest.removeprefix("memory.search."), ())
         if not isinstance(found, type) or not (
@@ -196,12 +200,10 @@ class PlainReader(pickle.Unpickler):
         return self._vectors
 
 
-def cut_array(
-    rows: Mapping[str, NDArray[Any]], kind: str, start: int, end: int, shape: tuple[int, ...]
-) -> NDArray[Any]:
-    """Return one of the arrays that are in a row."""
-    found = rows[kind][start:end]
-    return found if len(shape) == 1 else found.reshape(shape)
+def find_array(rows: Sequence[NDArray[Any]], row: int, number: int) -> NDArray[Any]:
+    """Return one of the arrays that are in rows."""
+    found: NDArray[Any] = rows[row][number]
+    return found
 
 
 def _is_slotted(kind: type) -> bool:

@@ -12,7 +12,7 @@ from filelock import FileLock
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
+from mapspeak.memory import Landmark, SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.memory.durable import MAX_BYTES, DurableFile
 
 IS_ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -298,3 +298,15 @@ def test_a_write_leaves_every_other_waypoint_as_it_stands(
     assert [new for old, new in zip(before, changed, strict=True) if old != new] == [
         "  - {name: row 50, pose: {x: 50, y: 0, yaw_deg: 0}, functional_landmarks: [tap]}  # 50"
     ]
+
+
+def test_threads_that_read_at_once_read_the_file_once(path: Path) -> None:
+    SemanticMapStore(path).write(place("dock"))
+    store = SemanticMapStore(path, looking=threading.Lock())
+    found = list[SemanticMap]()
+    threads = [threading.Thread(target=lambda: found.append(store.read())) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len({id(each.waypoints[0]) for each in found}) == 1

@@ -1,6 +1,7 @@
 """The memory to use: a file, the usual one of a robot, or a fleet's database."""
 
 import re
+import threading
 from pathlib import Path
 
 import click
@@ -60,7 +61,7 @@ def open_store(name: str, *, map_id: str | None = None) -> MemoryStore:
         ConfigError: The packages for the database are missing.
     """
     if not is_database(name):
-        return SemanticMapStore(Path(name), map_id=map_id)
+        return SemanticMapStore(Path(name), map_id=map_id, looking=threading.Lock())
     try:
         from mapspeak.memory.postgres import PostgresStore, shown_address  # noqa: PLC0415 - an extra
     except ImportError as error:

@@ -5,6 +5,7 @@ but what it read last.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -40,14 +41,21 @@ class SemanticMapStore(MemoryStore):
     Args:
         path: The file; it and its folder need not exist yet.
         map_id: The map that the robot is on. None takes the file for what it says it is.
+        looking: Held while the file is looked at, so that of several threads one reads it.
     """
 
     def __init__(
-        self, path: Path, *, map_id: str | None = None, lock_timeout_s: float = LOCK_TIMEOUT_S
+        self,
+        path: Path,
+        *,
+        map_id: str | None = None,
+        lock_timeout_s: float = LOCK_TIMEOUT_S,
+        looking: AbstractContextManager[object] | None = None,
     ) -> None:
         super().__init__(path=path, walls=WallFolder(path), map_id=map_id)
         self._file = DurableFile(path, lock_timeout_s=lock_timeout_s)
         self._seen: _Seen | None = None
+        self._looking = looking or nullcontext()
 
     def read(self) -> SemanticMap:
         """Return all remembered places; look into the file only where it changed.
@@ -102,6 +110,10 @@ class SemanticMapStore(MemoryStore):
 
     def _look(self) -> _Seen:
         """Return what the file says now, reading only what changed."""
+        with self._looking:
+            return self._read_changed()
+
+    def _read_changed(self) -> _Seen:
         seen = self._seen
         last = seen.document if seen else None
         try:
