@@ -15,6 +15,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from mapspeak.atomic import replace_file
 from mapspeak.errors import ConfigError
 
 FRACTION = re.compile(r"(?<=:\d\d)\.\d+$")
@@ -51,7 +52,7 @@ class Hold:
             ConfigError: The file cannot be written.
         """
         text = f"{reason}, at {at:%Y-%m-%d %H:%M:%S.%f}\n"
-        self._do(lambda: self._write(self.file, text))
+        self._do(lambda: replace_file(self.file, text.encode()))
 
     def lift(self) -> bool:
         """Let robots drive again, and return whether they were held.
@@ -75,7 +76,7 @@ class Hold:
         path = self.folder / ANSWERS / _file_of(robot)
         told = {"robot": robot, "held_by": held_by, "failure": failure}
         with suppress(OSError):
-            self._write(path, json.dumps(told))
+            replace_file(path, json.dumps(told).encode())
 
     def answers(self) -> tuple[str, ...]:
         """Return the robots that were stopped because of the present hold."""
@@ -99,7 +100,7 @@ class Hold:
         """
         told = {"robot": robot, "process": os.getpid(), "address": address}
         with suppress(OSError):
-            self._write(self.folder / SERVED / _file_of(robot), json.dumps(told))
+            replace_file(self.folder / SERVED / _file_of(robot), json.dumps(told).encode())
 
     def servers_of(self, address: str) -> tuple[int, ...]:
         """Return the other processes that serve the robot at an address."""
@@ -129,13 +130,6 @@ class Hold:
             for path, told in _read_all(self.folder / SERVED)
             if path.name not in answered and is_running(told.get("process"))
         )
-
-    def _write(self, path: Path, text: str) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Renamed into place: a reader never sees half of it.
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
 
     def _do(self, work: Callable[[], object]) -> None:
         try:

@@ -5,7 +5,6 @@ in one world. On the disk each has a folder, whose result.json comes last.
 """
 
 import json
-import os
 import re
 import shutil
 from contextlib import suppress
@@ -16,6 +15,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from mapspeak.atomic import replace_file
 from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.geometry import Pose
 from mapspeak.simulator import WorldObject
@@ -283,9 +283,8 @@ def find_result(run: Path, trial: Trial) -> Path | None:
 
 def write_result(run: Path, result: TrialResult) -> None:
     """Write result.json atomically."""
-    folder = trial_folder(run, result.trial)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / RESULT, _RESULT.dump_json(result, indent=2) + b"\n")
+    content = _RESULT.dump_json(result, indent=2) + b"\n"
+    replace_file(trial_folder(run, result.trial) / RESULT, content)
 
 
 def read_result(path: Path) -> TrialResult:
@@ -330,17 +329,3 @@ def say_fault(error: Exception) -> str:
         return error.msg
     lines = str(error).splitlines()
     return lines[0].rstrip(".") if lines else type(error).__name__
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file atomically: neither a reader nor a crash ever sees half of it."""
-    new = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with new.open("wb") as file:
-            file.write(data)
-            file.flush()
-            # Else a machine that loses power may keep the name and lose the content.
-            os.fsync(file.fileno())
-        new.replace(path)
-    finally:
-        new.unlink(missing_ok=True)

@@ -7,19 +7,18 @@ import contextlib
 import errno
 import os
 import stat
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from mapspeak.atomic import replacing
 from mapspeak.errors import SemanticMapError
 
 MAX_BYTES = 20_000_000
 """A larger file is taken for something else than a semantic map."""
 
 _POLL_S = 0.005
-_FOLDER_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
 
 
 Fingerprint = tuple[int, int, int, int, int]
@@ -90,16 +89,15 @@ class DurableFile:
             status = self._status()
             if status is not None and not os.access(target, os.W_OK):
                 raise PermissionError(errno.EACCES, "the file is read-only")
-            temporary = target.with_name(f".{target.name}.tmp")
-            try:
-                after = write_synced(temporary, content, like=status)
+            with replacing(target, ending="tmp") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+                after = _fingerprint_of(os.fstat(file.fileno()))
                 if self.fingerprint() != expected:
+                    file.close()
                     return None
-                temporary.replace(target)
-            finally:
-                temporary.unlink(missing_ok=True)
             renamed = self.fingerprint()
-            sync_folder(target.parent)
             # A new name counts as a change; or another file is there already.
             return renamed if renamed and renamed[:-1] == after[:-1] else after
 
@@ -142,37 +140,3 @@ class DurableFile:
 def _fingerprint_of(status: os.stat_result) -> Fingerprint:
     times = status.st_mtime_ns, status.st_ctime_ns
     return (status.st_dev, status.st_ino, status.st_size, *times)
-
-
-def write_synced(path: Path, content: bytes, *, like: os.stat_result | None = None) -> Fingerprint:
-    """Write a new file; its content, but not its name, is on the disk when this returns.
-
-    Args:
-        like: A file whose permissions and, as far as we may, owner it takes.
-    """
-    # Only a crash leaves one behind.
-    path.unlink(missing_ok=True)
-    with path.open("xb") as file:
-        if like is not None:
-            if sys.platform != "win32":
-                with contextlib.suppress(PermissionError):
-                    os.chown(path, like.st_uid, like.st_gid)
-            path.chmod(stat.S_IMODE(like.st_mode))
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-        return _fingerprint_of(os.fstat(file.fileno()))
-
-
-def sync_folder(folder: Path) -> None:
-    """Make the new name of a file durable, if the system supports it."""
-    if sys.platform == "win32":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno not in _FOLDER_CANNOT_SYNC:
-            raise
-    finally:
-        os.close(descriptor)

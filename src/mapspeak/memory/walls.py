@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from filelock import FileLock
 
+from mapspeak.atomic import sync_folder
 from mapspeak.errors import MapError, SemanticMapError
-from mapspeak.memory.durable import sync_folder
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map

@@ -1,7 +1,6 @@
 """skills.yaml, in which the owner declares a robot's skills; saved missions are such files too."""
 
 import io
-import os
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from enum import StrEnum
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from mapspeak.atomic import replace_file
 from mapspeak.errors import ConfigError, SkillError, say_cause
 from mapspeak.settings import read_settings
 from mapspeak.skill import (
@@ -293,11 +293,7 @@ def write_skills(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
     text = io.StringIO()
     YAML(typ="rt").dump(tree, text)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Renamed into place: a full disk leaves the file before.
-        unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-        unfinished.write_text(text.getvalue(), encoding="utf-8")
-        unfinished.replace(path)
+        replace_file(path, text.getvalue().encode())
     except OSError as error:
         raise _not_written(path, error) from error
 

@@ -14,7 +14,6 @@ import io
 import json
 import math
 import mmap
-import os
 import pickle
 import struct
 import zlib
@@ -30,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mapspeak
+from mapspeak.atomic import replacing
 from mapspeak.memory.search.meaningindex import TextVectors
 
 _HEAD = struct.Struct("<16sIQQ")
@@ -74,18 +74,9 @@ def keep_value(path: Path, value: object) -> None:
     content = types + told.getbuffer()
     gap = bytes(-(_HEAD.size + len(content)) % _ALIGNED)
     head = _HEAD.pack(_digest_code(), zlib.crc32(content), len(types), len(content) - len(types))
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            with unfinished.open("wb") as file:
-                file.writelines((head, content, gap))
-                file.writelines(each.data for each in chain.from_iterable(writer.rows.values()))
-                file.flush()
-                os.fsync(file.fileno())
-            unfinished.replace(path)
-        finally:
-            unfinished.unlink(missing_ok=True)
+    with contextlib.suppress(OSError), replacing(path) as file:
+        file.writelines((head, content, gap))
+        file.writelines(each.data for each in chain.from_iterable(writer.rows.values()))
 
 
 def load_value(path: Path, kind: type[Kept], *, vectors: TextVectors | None = None) -> Kept | None:

@@ -85,4 +85,4 @@ def test_the_new_file_is_on_the_disk_before_it_takes_the_place_of_the_old_one(
     monkeypatch.setattr(os, "replace", noted_replace)
     store.write(Waypoint(name="dock", pose=Pose(0.0, 0.0)))
 
-    assert steps == ["sync file", "replace", "sync folder"]
+    assert steps[-3:] == ["sync file", "replace", "sync folder"]

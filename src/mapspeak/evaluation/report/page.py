@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import NewType
 from urllib.parse import quote
 
+from mapspeak.atomic import replace_file
 from mapspeak.evaluation.agents.catalogue import is_script
 from mapspeak.evaluation.report.replay import PAGE, REPLAY, ReplayWriter, say_standing
 from mapspeak.evaluation.scores.rows import TableRow, count_rows, wilson_interval
-from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, trial_folder, write_whole
+from mapspeak.evaluation.trials import TRIALS, TrialResult, TrialState, trial_folder
 
 Html = NewType("Html", str)
 """Markup that was made here; plain text is not accepted where it is asked for."""
@@ -108,7 +109,7 @@ def write_page(run: Path, results: Sequence[TrialResult]) -> Path:
     writer = ReplayWriter()
     for result in results:
         writer.write(result, trial_folder(run, result.trial))
-    write_whole(run / PAGE, page)
+    replace_file(run / PAGE, page)
     return run / PAGE
 
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from mapspeak.atomic import replace_file
 from mapspeak.errors import MapspeakError
 from mapspeak.evaluation.trials import (
     CALLS,
@@ -20,7 +21,6 @@ from mapspeak.evaluation.trials import (
     Turn,
     read_turns,
     say_fault,
-    write_whole,
 )
 from mapspeak.memory import SemanticMap, SemanticMapStore
 from mapspeak.server.view.document import CallView, GridView, PoseView
@@ -91,7 +91,7 @@ class ReplayWriter:
             steps=list(_steps(turns, thinned, moments, folder / PICTURES)),
         )
         title = f"mapspeak: {trial.task} {trial.world} {trial.number:03d}"
-        write_whole(folder / REPLAY, build_replay_page(title, replay))
+        replace_file(folder / REPLAY, build_replay_page(title, replay))
 
     def _show(self, grid: OccupancyGrid, memory: SemanticMap) -> tuple[GridView | None, Overlay]:
         if grid.unknown.all():

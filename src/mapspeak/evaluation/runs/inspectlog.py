@@ -7,12 +7,13 @@ a file for each sample. A sample is a task in a world by one agent; its epochs a
 import base64
 import hashlib
 import json
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
+from mapspeak.atomic import replacing
 from mapspeak.evaluation.trials import PICTURES, Trial, TrialResult, Turn, read_turns, trial_folder
 
 LOG = "inspect.eval"
@@ -27,8 +28,8 @@ def write_log(run: Path, results: Sequence[TrialResult], versions: Mapping[str, 
     Args:
         versions: Of everything that took part, by name.
     """
-    new, summaries = run / f".{LOG}", []
-    with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as log:
+    summaries = []
+    with replacing(run / LOG) as file, ZipFile(file, "w", ZIP_DEFLATED, compresslevel=1) as log:
         for result in results:
             sample = _sample(run, result)
             name = f"samples/{sample['id']}_epoch_{sample['epoch']}.json"
@@ -37,7 +38,7 @@ def write_log(run: Path, results: Sequence[TrialResult], versions: Mapping[str, 
         log.writestr("summaries.json", json.dumps(summaries))
         header = _header(results, versions)
         log.writestr("header.json", json.dumps(header))
-    return new.replace(run / LOG)
+    return run / LOG
 
 
 def _header(results: Sequence[TrialResult], versions: Mapping[str, str]) -> dict[str, Any]:

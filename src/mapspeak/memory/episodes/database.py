@@ -13,8 +13,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from mapspeak.atomic import sync_folder
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.durable import sync_folder
 
 SCHEMA_VERSION = 1
 

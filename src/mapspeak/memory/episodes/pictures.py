@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from mapspeak.atomic import replace_file
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory.durable import sync_folder, write_synced
 
 _SUFFIXES = {b"\xff\xd8\xff": "jpg", b"\x89PNG\r\n\x1a\n": "png"}
-_OURS = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{12}\.(?:jpg|png)(?:\.tmp)?")
+_OURS = re.compile(r"\.?\d{8}T\d{6}Z-[0-9a-f]{12}\.(?:jpg|png)(?:\.tmp)?")
 
 
 def picture_name(content: bytes, taken_at: datetime) -> str:
@@ -49,11 +49,7 @@ class PictureFolder:
         target = self.path / name
         if target.exists() and target.stat().st_size == len(content):
             return
-        self.path.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f"{name}.tmp")
-        write_synced(temporary, content)
-        temporary.replace(target)
-        sync_folder(self.path)
+        replace_file(target, content, ending="tmp")
 
     def remove_all_but(self, kept: Collection[str]) -> int:
         """Remove our pictures that no record names, and return how many."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
+from mapspeak.atomic import sync_folder
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.durable import sync_folder
 from mapspeak.memory.episodes.store import BroughtOver, bring_over
 from mapspeak.memory.exchange.mounting import mount
 from mapspeak.memory.merging import merge_waypoint

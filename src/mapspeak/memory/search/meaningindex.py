@@ -1,7 +1,6 @@
 """Compare the meaning of a phrase with those of many records by embedding vectors."""
 
 import contextlib
-import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
@@ -12,6 +11,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.atomic import replacing
 from mapspeak.memory.search.answer import Entry, MatchField, Thresholds
 from mapspeak.memory.search.wordindex import Texts
 
@@ -96,12 +96,9 @@ class TextVectors:
         if self._kept is None or len(self) == self._n_kept:
             return
         texts = sorted(self._vectors)
-        unfinished = self._kept.with_name(f"{self._kept.name}.{os.getpid()}.tmp")
         with contextlib.suppress(OSError):
-            self._kept.parent.mkdir(parents=True, exist_ok=True)
-            with unfinished.open("wb") as file:
+            with replacing(self._kept) as file:
                 np.savez(file, model=self.embedder.name, texts=texts, vectors=self.find(texts))
-            unfinished.replace(self._kept)
             self._n_kept = len(self)
 
     def __len__(self) -> int:

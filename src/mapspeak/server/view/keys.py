@@ -15,6 +15,7 @@ from pathlib import Path
 
 import anyio
 
+from mapspeak.atomic import replace_file
 from mapspeak.memory.quoting import clean_line
 
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"
@@ -101,7 +102,7 @@ class ViewDesk:
             key_digest, _, name = request.read_text("utf-8").partition("\n")
             keys.admit(key_digest.strip(), name)
             told = request.with_name(f"{request.stem}-{os.getpid()}{ANSWER}")
-            told.write_text(f"{url}\n{robots}\n", "utf-8")
+            replace_file(told, f"{url}\n{robots}\n".encode())
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,11 +125,7 @@ class ViewRequest:
         """
         key = secrets.token_urlsafe(24)
         file = control / FOLDER / f"{os.getpid()}-{secrets.token_hex(4)}{REQUEST}"
-        file.parent.mkdir(parents=True, exist_ok=True)
-        # Renamed into place: no server sees half of it.
-        half = file.with_suffix(".half")
-        half.write_text(f"{digest(key)}\n{person}\n", "utf-8")
-        half.replace(file)
+        replace_file(file, f"{digest(key)}\n{person}\n".encode())
         return cls(file, key)
 
     def answers(self) -> Iterator[tuple[str, str]]:

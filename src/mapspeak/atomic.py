@@ -1,0 +1,74 @@
+"""Files that are replaced as a whole: a full disk or a crash leaves the old one or the new one."""
+
+import contextlib
+import errno
+import os
+import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+_FOLDER_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
+
+
+@contextlib.contextmanager
+def replacing(path: Path, *, ending: str = "") -> Iterator[BinaryIO]:
+    """Let a new file be written; at the end of the block it takes a file's place, on the disk.
+
+    It keeps the permissions of the old file and, as far as we may, its owner; a symbolic link is
+    followed, and a missing folder made. A block that raises, or closes the new file, leaves the
+    old one and nothing else.
+
+    Args:
+        ending: Of the unfinished file's name, from a caller that keeps other writers away: what a
+            crash has left of an earlier one goes with it.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = target.with_name(f".{target.name}.{ending or os.getpid()}")
+    unfinished.unlink(missing_ok=True)
+    try:
+        with unfinished.open("xb") as file:
+            with contextlib.suppress(FileNotFoundError):
+                _take_after(target.stat(), unfinished)
+            yield file
+            if file.closed:
+                return
+            file.flush()
+            # Else a machine that loses power may keep the name and lose the content.
+            os.fsync(file.fileno())
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    sync_folder(target.parent)
+
+
+def replace_file(path: Path, content: bytes, *, ending: str = "") -> None:
+    """Put a new content in a file's place; see `replacing`."""
+    with replacing(path, ending=ending) as file:
+        file.write(content)
+
+
+def _take_after(status: os.stat_result, new: Path) -> None:
+    if sys.platform != "win32":
+        with contextlib.suppress(PermissionError):
+            os.chown(new, status.st_uid, status.st_gid)
+    new.chmod(stat.S_IMODE(status.st_mode))
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the new name of a file durable, if the system supports it."""
+    if sys.platform == "win32":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _FOLDER_CANNOT_SYNC:
+            raise
+    finally:
+        os.close(descriptor)
