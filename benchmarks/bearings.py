@@ -21,7 +21,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.places.goalcheck import judge_goal
 from mapspeak.places.naming import Place
-from mapspeak.places.relations.choosing import stand_at
+from mapspeak.places.ways import stand_at
 from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector

@@ -27,7 +27,7 @@ from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.memory.alignment.framed import FramedMemory
 from mapspeak.memory.exchange.uniting import merge_files
 from mapspeak.memory.search.answer import Verdict
-from mapspeak.places.recall.asking import RecallQuery, recall
+from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import choose_goal
 from mapspeak.simulator import BODY_RADIUS_M
 from mapspeak.simulator.worlds.worldfiles import parse_world

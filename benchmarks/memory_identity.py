@@ -23,7 +23,7 @@ from benchmarks.memory.sites import Site
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.things.finding import find_things
-from mapspeak.places.recall.asking import RecallQuery, recall
+from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel

@@ -20,7 +20,7 @@ from benchmarks.memory.sites import RADIUS_M, Site
 from mapspeak.geometry import Pose
 from mapspeak.memory.search.answer import Verdict
 from mapspeak.memory.search.meaningindex import Embedder, find_model
-from mapspeak.places.recall.asking import Recall, RecallQuery, recall
+from mapspeak.places.asking import Recall, RecallQuery, recall
 from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector

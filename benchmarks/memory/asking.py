@@ -7,7 +7,7 @@ from benchmarks.memory.sites import RADIUS_M, Site
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.search.meaningindex import Embedder
-from mapspeak.places.recall.asking import Recall, RecallQuery, recall
+from mapspeak.places.asking import Recall, RecallQuery, recall
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
 

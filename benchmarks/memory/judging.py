@@ -13,9 +13,9 @@ from benchmarks.memory.places import truth_of
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import wrap_angle
 from mapspeak.memory.search.answer import EntryKind, Verdict
+from mapspeak.places.asking import Recall
+from mapspeak.places.candidate import SURE_RATIO, RecallCandidate
 from mapspeak.places.goalcheck import judge_goal
-from mapspeak.places.recall.asking import Recall
-from mapspeak.places.recall.candidate import SURE_RATIO, RecallCandidate
 from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["Facing", "Fault", "Judged", "Outcome", "choose", "judge_all"]

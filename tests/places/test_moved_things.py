@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.places.recall.asking import RecallQuery, recall
+from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.worldmodel.model import WorldModel
 

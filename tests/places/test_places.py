@@ -66,10 +66,44 @@ def test_a_remembered_name_wins_over_coordinates_that_it_looks_like() -> None:
     assert find_place(_world(SemanticMap(waypoints=(odd,))), "3, 4").point == Point(6.0, 1.0)
 
 
-@pytest.mark.parametrize("words", ["R9", "the moon", "", "1.5", "F3", "nan, 2", "1,2,3,4"])
-def test_a_place_that_is_not_there_is_answered_with_those_that_are(words: str) -> None:
-    with pytest.raises(GoalError, match="rooms and corridors R1 R2; doors D1"):
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("R9", "Known are rooms and corridors R1 R2."),
+        ("D7", "Known are doors D1."),
+        ("F3", "Known are rooms and corridors R1 R2; doors D1"),
+        ("the moon", "'nearest room'"),
+        ("", "'nearest room'"),
+        ("1.5", "'nearest room'"),
+        ("nan, 2", "'nearest room'"),
+        ("left door of R1", "'all doors of R1'"),
+        ("somewhere to the left", "'2 m left of the robot'"),
+    ],
+)
+def test_a_place_that_is_not_there_is_answered_with_those_that_are(words: str, told: str) -> None:
+    with pytest.raises(GoalError) as caught:
         find_place(_world(), words)
+    assert told in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("Room 1", "R1"),
+        ("the room R2", "R2"),
+        ("door 1", "D1"),
+        ("waypoint 1", "W1"),
+        ("door between R1 and R2", "D1"),
+    ],
+)
+def test_a_place_is_meant_by_its_kind_and_number_or_by_what_it_joins(words: str, name: str) -> None:
+    assert find_place(_world(), words).name == name
+
+
+def test_several_ids_are_answered_with_no_other_place() -> None:
+    with pytest.raises(GoalError) as caught:
+        find_place(_world(), "R1, R2")
+    assert "W1" not in caught.value.hint
 
 
 @pytest.mark.parametrize("name", ["R3", "w12", "1, 2", "(1.0; -2)", "robot", "Here"])

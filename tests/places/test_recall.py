@@ -11,12 +11,13 @@ from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
+from mapspeak.places.asking import RecallQuery, recall
+from mapspeak.places.candidate import RecallDoubt
 from mapspeak.places.naming import AmbiguousPlaceError
-from mapspeak.places.recall.asking import RecallQuery, recall
-from mapspeak.places.recall.candidate import RecallDoubt
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 from remembering import EXTINGUISHER, LADDER, ROBOT, look, looks_at, world_of
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)
@@ -45,6 +46,37 @@ def test_a_thing_seen_from_several_places_is_one_candidate_with_position_and_goa
     assert first.match is not None
     assert first.match.basis is Basis.NAME
     assert answer.doubt is None
+
+
+WAITING = Waypoint(
+    name="where visitors wait", description="The place where visitors wait.", pose=ROBOT
+)
+
+
+@pytest.mark.parametrize("words", ["where do visitors wait", "the place where visitors wait"])
+def test_what_is_found_for_words_is_a_goal_by_the_same_words(words: str) -> None:
+    world = world_of(*LOOKS, WAITING)
+    answer = recall(world, RecallQuery(words=words))
+    assert answer.verdict is Verdict.FOUND
+    place = find_place(world, words)
+    assert isinstance(place.thing, RememberedPlace)
+    assert place.thing.id == answer.candidates[0].id == "W3"
+    assert "where visitors wait" in place.reason
+
+
+def test_a_thing_may_be_meant_in_a_room_that_words_mean() -> None:
+    place = find_place(world_of(*LOOKS, WEST), "fire extinguisher in the largest room")
+    assert isinstance(place.thing, RememberedThing)
+    with pytest.raises(GoalError):
+        find_place(world_of(*LOOKS, WEST), "fire extinguisher in the smallest room")
+
+
+def test_a_room_word_is_answered_with_no_thing() -> None:
+    table = look("west", 2.0, 1.0, ("kitchen table", LADDER), yaw_deg=180)
+    world = world_of(table)
+    with pytest.raises(GoalError) as caught:
+        find_place(world, "cafeteria")
+    assert "T1" not in caught.value.hint
 
 
 def test_a_thing_that_one_view_alone_speaks_of_is_likely_and_not_found() -> None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory.things.approach import LOOK_AGAIN_M
+from mapspeak.places.asking import RecallQuery, recall
+from mapspeak.places.candidate import RecallDoubt, find_doubt
 from mapspeak.places.goalcheck import GoalVerdict
-from mapspeak.places.recall.asking import RecallQuery, recall
-from mapspeak.places.recall.candidate import RecallDoubt, find_doubt
 from remembering import EXTINGUISHER, look, looks_at, world_of
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)

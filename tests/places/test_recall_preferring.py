@@ -6,7 +6,7 @@ from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.search.answer import Verdict
-from mapspeak.places.recall.asking import RecallQuery, recall
+from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.worldmodel.model import WorldModel
 from remembering import look
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.places.recall.asking import RecallQuery, recall
-from mapspeak.places.recall.candidate import RecallCandidate
+from mapspeak.places.asking import RecallQuery, recall
+from mapspeak.places.candidate import RecallCandidate
 from mapspeak.worldmodel.model import WorldModel
 from remembering import look
 

@@ -110,6 +110,22 @@ async def test_who_asks_again_from_where_the_robot_stands_gets_the_picture_witho
     assert len(robot.goals) == 1
 
 
+async def test_a_thing_in_view_from_near_is_looked_at_from_where_the_robot_stands(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await note_fridge(client)
+        await client.call_tool("navigate_to", {"place": "T1"})
+        beside = robot.pose.transform(Point(-0.3, 0.3))
+        robot.pose = Pose(beside.x, beside.y, robot.pose.yaw_rad - 0.2)
+        before, n_goals = robot.pose, len(robot.goals)
+        told = text_of(await client.call_tool("look_at", {"place": "T1"}))
+    assert robot.pose == before
+    assert len(robot.goals) == n_goals
+    assert "T1" in columns(told)
+
+
 async def test_a_drive_that_takes_longer_is_waited_for_by_asking_again(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path) as client:

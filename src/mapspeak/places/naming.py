@@ -2,14 +2,14 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap, Waypoint, name_key
 from mapspeak.memory.quoting import quote_name
-from mapspeak.memory.search.answer import Answer, Basis, Verdict
+from mapspeak.memory.search.answer import Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
@@ -19,6 +19,16 @@ from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 MOST_NAMED = 12
 MOST_GUESSES = 3
 ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>[0-9]{1,9})")
+KIND_ID = re.compile(
+    r"(?:the\s+)?(?P<kind>room|corridor|hallway|open space|door|frontier|place|waypoint|thing)"
+    r"\s+(?P<id>[A-Za-z]?[0-9]{1,9})",
+    re.IGNORECASE,
+)
+"""Room 4" is R4, and "room R4" too."""
+LETTERS = {"hallway": "C", "place": "W", "waypoint": "W"}
+"""Of kinds whose ids do not begin with their own first letter."""
+IDS = re.compile(rf"{ID.pattern}(?:(?:\s*,\s*|\s+)(?:and\s+)?[A-Za-z][0-9]{{1,9}})*")
+ARTICLE = re.compile(r"(?:the|an?|any|some)\s+", re.IGNORECASE)
 REGION_ID = re.compile(r"(?<!\w)[RCO]\d+(?!\w)", re.IGNORECASE)
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 SPOT = re.compile(
@@ -91,7 +101,12 @@ def find_named(world: WorldModel, words: str) -> Place | None:
     """
     wanted = words.strip()
     place = _find_by_id(world, wanted.upper()) if ID.fullmatch(wanted) else None
-    return place or _find_by_name(world, wanted) or _read_spot(world, wanted)
+    return (
+        place
+        or _find_by_name(world, wanted)
+        or _read_spot(world, wanted)
+        or _find_by_number(world, wanted)
+    )
 
 
 def no_such_place(world: WorldModel, words: str) -> GoalError:
@@ -135,6 +150,16 @@ def _find_by_id(world: WorldModel, place_id: str) -> Place | None:
         *world.places,
     ]
     return next((Place(thing.id, thing) for thing in things if thing.id == place_id), None)
+
+
+def _find_by_number(world: WorldModel, words: str) -> Place | None:
+    """Find "room 4", which is R4; of a region its number counts, whatever kind it is called."""
+    match = KIND_ID.fullmatch(words)
+    if match is None:
+        return None
+    kind = match["kind"].casefold()
+    letter, has_letter = LETTERS.get(kind, kind[0].upper()), match["id"][0].isalpha()
+    return _find_by_id(world, match["id"].upper() if has_letter else f"{letter}{match['id']}")
 
 
 def _find_by_name(world: WorldModel, name: str) -> Place | None:
@@ -204,53 +229,84 @@ def _contains_words(text: str, words: str) -> bool:
 def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
     if find_elsewhere(world.memory, wanted):
         return "Let the robot see more of the building", NextStep.ALIGN
-    if world.places and not ID.fullmatch(wanted):
-        answer = world.recollection.find(wanted, limit=MOST_GUESSES)
-        if answer.verdict is not Verdict.NOT_REMEMBERED:
-            return f"{_say_guesses(answer)} {_say_phrases(world, wanted)}", NextStep.READ_MORE
+    if ID.fullmatch(wanted):
+        return _say_ids(world, wanted[0].upper()), NextStep.SEE_PLACES
+    phrases = _say_phrases(world, wanted)
+    guesses = _guess(world, wanted) if world.places and not IDS.fullmatch(wanted) else ()
+    if guesses:
+        return f"{_say_guesses(guesses)} {phrases}", NextStep.READ_MORE
+    return phrases, NextStep.SEE_PLACES
+
+
+def _say_ids(world: WorldModel, letter: str) -> str:
+    """Say which ids of a kind there are, else all."""
     groups = {
         "rooms and corridors": [region.id for region in world.rooms.regions],
         "doors": [door.id for door in world.rooms.doors],
         "frontiers": [frontier.id for frontier in world.frontiers.frontiers],
         "remembered": [place.id for place in world.places],
     }
-    known = [f"{name} {_some_of(ids)}" for name, ids in groups.items() if ids]
-    phrases = "" if ID.fullmatch(wanted) else _say_phrases(world, wanted)
-    hint = f"Known are {'; '.join(known) or 'no places yet'}. {phrases}".rstrip()
-    return hint, NextStep.SEE_PLACES
+    same = {name: ids for name, ids in groups.items() if any(each[0] == letter for each in ids)}
+    known = [f"{name} {_some_of(ids)}" for name, ids in (same or groups).items() if ids]
+    return f"Known are {'; '.join(known) or 'no places yet'}."
+
+
+def _guess(world: WorldModel, wanted: str) -> tuple[EntryCandidate, ...]:
+    """Return what may be meant; by a bare noun no thing that is only like it: a "kitchen"."""
+    answer = world.recollection.find(wanted, limit=MOST_GUESSES)
+    if answer.verdict is Verdict.NOT_REMEMBERED:
+        return ()
+    is_bare = len(ARTICLE.sub("", wanted, count=1).split()) == 1
+    return tuple(
+        each
+        for each in answer.candidates
+        if not (is_bare and each.basis is Basis.MEANING and each.entry.kind is EntryKind.THING)
+    )
 
 
 MOST_PHRASES = 3
+COUNTED = re.compile(r"\b[a-z][a-z0-9]*?(?=s?\b)")
+"""Words, a plural as its singular."""
 
 
 def _say_phrases(world: WorldModel, wanted: str) -> str:
-    """Say what words would be read here, those first that speak of the same kind of thing."""
-    regions, doors = world.rooms.regions, world.rooms.doors
+    """Say what words would be read here, those first that share most with the words."""
+    said = set(COUNTED.findall(wanted.casefold()))
+    near = sorted(_list_phrases(world, wanted), key=lambda each: -_count_shared(each, said))
+    return f"Such words can be read: {', '.join(map(repr, near[:MOST_PHRASES]))}."
+
+
+def _count_shared(phrase: str, said: set[str]) -> int:
+    return len(said & set(COUNTED.findall(phrase.casefold())) - {"of", "the", "to", "in"})
+
+
+def _list_phrases(world: WorldModel, wanted: str) -> Iterator[str]:
+    """Yield phrases that mean something here, of the regions that the words name."""
+    regions = world.rooms.regions
+    named = [each for each in regions if re.search(rf"\b{each.id}\b", wanted, re.IGNORECASE)]
     kinds = {
         "room": any(each.room_class is RoomClass.ROOM for each in regions),
-        "door": bool(doors),
+        "door": bool(world.rooms.doors),
         "corridor": any(each.room_class is RoomClass.CORRIDOR for each in regions),
     }
+    for region in named[:1]:
+        if world.rooms.doors_of(region):
+            yield f"all doors of {region.id}"
+        yield from (f"{where} {region.id}" for where in ("the middle of", "next to", "facing"))
     known = [kind for kind, is_known in kinds.items() if is_known]
-    asked = [kind for kind in known if kind in wanted.casefold()]
-    named = [each.id for each in regions if re.search(rf"\b{each.id}\b", wanted, re.IGNORECASE)]
-    if named:
-        phrases = [f"{where} {named[0]}" for where in ("the middle of", "next to", "facing")]
-    elif asked:
-        phrases = [f"{which} {asked[0]}" for which in ("nearest", "largest")]
-        phrases.append(f"all {asked[0]}s")
-    else:
-        phrases = [f"nearest {kind}" for kind in known]
-        phrases += [f"the middle of {each.id}" for each in regions[:1]]
-        phrases.append("2 m in front of the robot")
-    return f"Such words can be read: {', '.join(map(repr, phrases[:MOST_PHRASES]))}."
+    yield from (f"nearest {kind}" for kind in known)
+    yield from (f"largest {kind}" for kind in known)
+    yield from (f"all {kind}s" for kind in known)
+    yield from (f"the middle of {each.id}" for each in regions[:1])
+    yield "2 m in front of the robot"
+    yield "2 m left of the robot"
 
 
-def _say_guesses(answer: Answer) -> str:
+def _say_guesses(guesses: Sequence[EntryCandidate]) -> str:
     """Name what may be meant, for the reader to confirm: likeness alone does not make a goal."""
-    first = answer.candidates[0]
+    first = guesses[0]
     by = "meaning" if first.basis is Basis.MEANING else "words"
-    told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in answer.candidates)
+    told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in guesses)
     return (
         f"Nothing remembered is called so; nearest in {by}: {told}. If {first.entry.id} is meant, "
         f"use {first.entry.id}."

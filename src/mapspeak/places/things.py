@@ -10,6 +10,7 @@ from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_views, view_of
 from mapspeak.memory.things.labels import names_no_less
 from mapspeak.places.naming import (
+    ARTICLE,
     MOST_NAMED,
     AmbiguousPlaceError,
     Place,
@@ -22,7 +23,6 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 THING_ID = re.compile(r"[Tt]\d+")
-ARTICLE = re.compile(r"(?:the|an?|any|some)\s+", re.IGNORECASE)
 IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNORECASE | re.DOTALL)
 AROUND_M = 5.0
 """Largest distance from the robot to a thing that a person says is gone."""

@@ -4,13 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 from mapspeak.places.naming import Place, Spot
-from mapspeak.places.standing import choose_crossing, choose_standing_point, stand_before
+from mapspeak.places.standing import (
+    arrival_pose,
+    choose_crossing,
+    choose_standing_point,
+    facing_in,
+    stand_before,
+)
+from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +94,25 @@ def standing_point(world: WorldModel, place: Place) -> Point:
             return stand_before(world, remembered).point
         case _:
             return place.point
+
+
+def stand_at(world: WorldModel, place: Place) -> Pose:
+    """Return the pose to drive to for a place, whether or not the robot can stand there."""
+    match place.thing:
+        case Region() as region:
+            point = choose_standing_point(world, region)
+            return Pose(point.x, point.y, facing_in(world, region, point))
+        case Door() as door:
+            return arrival_pose(world, choose_crossing(world, door))
+        case Frontier(pose=pose):
+            return pose
+        case RememberedPlace(waypoint=waypoint):
+            return waypoint.pose
+        case RememberedThing() as remembered:
+            return stand_before(world, remembered)
+        case Spot(point=point, yaw_rad=yaw_rad):
+            straight_on = arrival_pose(world, point)
+            return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)
 
 
 def find_own_point(world: WorldModel, place: Place) -> Point | None:

@@ -7,7 +7,7 @@ from embedding import ConceptEmbedder
 from fakes import two_rooms
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.places.recall.asking import Recall, RecallQuery, recall
+from mapspeak.places.asking import Recall, RecallQuery, recall
 from mapspeak.server.text.recall import say_advice, say_evidence
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector

@@ -6,39 +6,68 @@ from enum import StrEnum
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
+from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.places.goalcheck import GoalCheck, check_goal, say_instead, say_refusal
 from mapspeak.places.naming import Place, Spot, find_named, is_taken_name, no_such_place, say_spot
 from mapspeak.places.relations.relating import find_related, find_several_related
-from mapspeak.places.standing import (
-    arrival_pose,
-    choose_crossing,
-    choose_standing_point,
-    facing_in,
-    stand_before,
-)
-from mapspeak.places.things import find_thing, place_of
+from mapspeak.places.standing import arrival_pose
+from mapspeak.places.things import IN_ROOM, find_thing, find_things, place_of
+from mapspeak.places.ways import stand_at
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
+from mapspeak.worldmodel.remembered import RememberedThing
 
 
 def find_place(world: WorldModel, words: str) -> Place:
     """Find what is meant by an id, a remembered name, coordinates, "robot", a relation or a thing.
 
     A relation is such as "left of W3" or "between D1 and D2"; `mapspeak.places.relations`. A
-    thing is meant by its label, such as "fire extinguisher", where nothing else is called so.
+    thing is meant by its label, such as "fire extinguisher", where nothing else is called so; and
+    what `recall` finds to be called so, and has no doubt of, is meant too.
 
     Raises:
         GoalError: There is no such place, or there are several; the hint says what became of it
             and what there is.
     """
-    place = find_named(world, words) or find_related(world, words) or find_thing(world, words)
+    place = find_named(world, words) or find_related(world, words)
+    place = place or _find_remembered(world, name_room(world, words))
     if place is None:
         raise no_such_place(world, words)
     if isinstance(place.thing, RememberedThing) and not place.reason:
         return place_of(world, place.thing, name=place.name)
     return place
+
+
+def _find_remembered(world: WorldModel, words: str) -> Place | None:
+    """Find the one thing that is called so, else what is found to be without a doubt.
+
+    Likeness in meaning or words does not count: the robot never drives to a guess.
+    """
+    if is_taken_name(words) or len(find_things(world, words)) == 1:
+        return find_thing(world, words)
+    found = recall(world, RecallQuery(words=words, n=1))
+    first = found.candidates[0] if found.verdict is Verdict.FOUND else None
+    if first is None or first.match is None or first.match.basis is not Basis.NAME:
+        return find_thing(world, words)
+    if first.kind is EntryKind.PLACE:
+        (place,) = (each for each in world.places if each.id == first.id)
+        return Place(words.strip(), place, f"{place.id} {quote_name(place.waypoint.name)}")
+    (thing,) = (each for each in world.things if each.id == first.id)
+    return place_of(world, thing, name=words.strip())
+
+
+def name_room(world: WorldModel, words: str) -> str:
+    """Return "ladder in R2" for "ladder in the largest room"; other words as they are."""
+    match = IN_ROOM.fullmatch(words)
+    if match is None or find_named(world, match["room"]) is not None:
+        return words
+    room = find_related(world, match["room"])
+    if room is None or not isinstance(room.thing, Region):
+        return words
+    return f"{match['label']} in {room.thing.id}"
 
 
 def find_places(world: WorldModel, words: str) -> tuple[Place, ...]:
@@ -186,22 +215,3 @@ def _has_heading(place: Place) -> bool:
             return yaw_rad is not None
         case _:
             return True
-
-
-def stand_at(world: WorldModel, place: Place) -> Pose:
-    """Return the pose to drive to for a place, whether or not the robot can stand there."""
-    match place.thing:
-        case Region() as region:
-            point = choose_standing_point(world, region)
-            return Pose(point.x, point.y, facing_in(world, region, point))
-        case Door() as door:
-            return arrival_pose(world, choose_crossing(world, door))
-        case Frontier(pose=pose):
-            return pose
-        case RememberedPlace(waypoint=waypoint):
-            return waypoint.pose
-        case RememberedThing() as remembered:
-            return stand_before(world, remembered)
-        case Spot(point=point, yaw_rad=yaw_rad):
-            straight_on = arrival_pose(world, point)
-            return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)

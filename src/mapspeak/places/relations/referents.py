@@ -227,7 +227,9 @@ CLASSES = {
     "hallway": (RoomClass.CORRIDOR,),
 }
 """What a word may be said of; other words of all."""
-DOOR = pattern(r"(?:door|doorway)(?: (?:of|in|to) (?P<room>.+))?")
+DOOR = pattern(
+    r"(?:door|doorway)(?: (?:between (?P<one>.+?) and (?P<other>.+)|(?:of|in|to) (?P<room>.+)))?"
+)
 OF_PLACE = pattern(r"(?P<label>.+?) (?:of|at|seen from|from) (?P<place>.+)")
 
 
@@ -344,14 +346,18 @@ def _find_only_door(world: WorldModel, wanted: str) -> Place | None:
     match = DOOR.fullmatch(wanted)
     if match is None:
         return None
-    room = find_room_here(world)
-    if match["room"] is not None:
-        known = find_known(world, match["room"])
-        if known is None or known.region is None:
-            return None
-        room = known.region
-    doors = world.rooms.doors_of(room)
+    named = [match[each] for each in ("one", "other", "room") if match[each]]
+    known = [find_known(world, each) for each in named]
+    rooms = [each.region for each in known if each is not None and each.region is not None]
+    if len(rooms) < len(named):
+        return None
+    rooms = rooms or [find_room_here(world)]
+    ids = {room.id for room in rooms}
+    doors = [door for door in world.rooms.doors if ids <= set(door.region_ids)]
     if len(doors) == 1:
         return Place(doors[0].id, doors[0])
-    ids = ", ".join(door.id for door in doors[:MOST_NAMED]) or "none"
-    raise GoalError(f"{room.id} has {len(doors)} doors.", hint=f"Say which one by its id: {ids}.")
+    said = " and ".join(room.id for room in rooms)
+    has = f"{said} {'have' if len(rooms) > 1 else 'has'} {len(doors)} doors"
+    shown = ", ".join(door.id for door in doors[:MOST_NAMED]) or "none"
+    between = f"{has} between them" if len(rooms) > 1 else has
+    raise GoalError(f"{between}.", hint=f"Say which one by its id: {shown}.")

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory.things.approach import COMFORT_M
+from mapspeak.memory.things.approach import COMFORT_M, FACED_M
 from mapspeak.places.goalcheck import check_goal
 from mapspeak.places.naming import Place, Spot
-from mapspeak.places.relations.choosing import CheckedGoal, choose_goal, find_place
+from mapspeak.places.relations.choosing import CheckedGoal, check_place, choose_goal, find_place
 from mapspeak.places.standing import choose_crossing, point_ahead, spread_places
+from mapspeak.places.ways import stand_at
 from mapspeak.spatial.fieldofview import (
     N_RAYS,
     SIGHT_M,
@@ -83,10 +84,22 @@ def choose_view(world: WorldModel, words: str, half_view_rad: float) -> CheckedG
     """
     place = find_place(world, words)
     pose = find_viewpoint(world, place, half_view_rad)
+    if isinstance(place.thing, RememberedThing) and _shows_as_well(world, place, half_view_rad):
+        return replace(check_place(world, place), pose=world.robot)
     if pose is None:
         return choose_goal(world, place=words, x=None, y=None, yaw_deg=None)
     check = check_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
     return CheckedGoal(place, pose, check)
+
+
+def _shows_as_well(world: WorldModel, place: Place, half_view_rad: float) -> bool:
+    """Return True where the robot has a thing as near and as well in view as it would drive to."""
+    here, there = world.robot, stand_at(world, place)
+    shown, best = (measure_shown(world, place, pose, half_view_rad) for pose in (here, there))
+    if not shown or best is None:
+        return False
+    near_m = max(place.point.distance_to(there.point), FACED_M)
+    return place.point.distance_to(here.point) <= near_m and shown >= GOOD_RATIO * best
 
 
 def is_there(robot: Pose, pose: Pose) -> bool:

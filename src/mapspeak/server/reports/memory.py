@@ -18,9 +18,9 @@ from mapspeak.memory.episodes.observation import (
 from mapspeak.memory.quoting import quote, quote_name
 from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
+from mapspeak.places.asking import Recall, RecallQuery
+from mapspeak.places.candidate import RecallCandidate
 from mapspeak.places.goalcheck import say_check
-from mapspeak.places.recall.asking import Recall, RecallQuery
-from mapspeak.places.recall.candidate import RecallCandidate
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
@@ -225,7 +225,7 @@ class RecallAnswer(Report):
     def text(self) -> str:
         """The answer in lines: what to do, a line for each candidate, what speaks for the first."""
         fitting = f"{self.n_fitting} fit{'s' * (self.n_fitting == 1)} {quote(self.understood)} best"
-        heading = f"{len(self.candidates)} of {self.n_searched}, the likest first; {fitting}"
+        heading = f"{len(self.candidates)} of {self.n_searched}, the likeliest first; {fitting}"
         lines = [self.advice]
         for first in self.candidates[:1]:
             lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))

@@ -8,10 +8,10 @@ from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEv
 from mapspeak.memory.store.forgetting import Forgotten
 from mapspeak.memory.things.approach import LOOK_AGAIN_M
 from mapspeak.memory.things.thing import Thing
+from mapspeak.places.asking import Recall
+from mapspeak.places.candidate import RecallCandidate, RecallDoubt
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
-from mapspeak.places.recall.asking import Recall
-from mapspeak.places.recall.candidate import RecallCandidate, RecallDoubt
 from mapspeak.server.text.findings import say_guess
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import list_some, say_count

@@ -12,8 +12,8 @@ from mapspeak.driving.episodewriter import Keeping
 from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
+from mapspeak.places.asking import find_speaking_places
 from mapspeak.places.goalcheck import FARTHEST_M
-from mapspeak.places.recall.asking import find_speaking_places
 from mapspeak.places.things import find_gone, forget_thing
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.reports.mappicture import say_axes, say_plain

@@ -8,8 +8,8 @@ from pydantic import Field
 from mapspeak.driving.drivereport import find_failed
 from mapspeak.errors import GoalError
 from mapspeak.memory.search.answer import EntryKind
-from mapspeak.places.recall.asking import RecallQuery, recall
-from mapspeak.places.relations.choosing import check_place, find_place
+from mapspeak.places.asking import RecallQuery, recall
+from mapspeak.places.relations.choosing import check_place, find_place, name_room
 from mapspeak.places.things import split_room
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.reports.robot import GoalAnswer
@@ -145,7 +145,7 @@ class FindTools:
         world = await session.fetch_world_model(needs_memory=True)
 
         def ask() -> RecallAnswer:
-            words, room_id = split_room(world, query)
+            words, room_id = split_room(world, name_room(world, query))
             begin, end = read_past(since, until, now)
             wanted = RecallQuery(
                 words=words if room is None else query,

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from mapspeak.memory import Landmark, group_views
 from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
+from mapspeak.places.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.goalcheck import is_in_wall, say_check
 from mapspeak.places.naming import Place
-from mapspeak.places.recall.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
 from mapspeak.places.ways import find_own_point
@@ -16,9 +16,9 @@ from mapspeak.robot import CameraPicture
 from mapspeak.server.text.findings import say_conflict, say_finding, say_guess, say_support
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import (
+    KINDS,
     join_words,
     say_count,
-    say_kind,
     say_path,
     say_point,
     say_pose,
@@ -27,7 +27,7 @@ from mapspeak.server.text.wording import (
 from mapspeak.server.text.world.maps import say_merits, say_size
 from mapspeak.server.text.world.notices import say_direction, say_obstruction
 from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
-from mapspeak.spatial.fieldofview import HALF_VIEW_RAD
+from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, SIGHT_M
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
@@ -192,7 +192,7 @@ def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[s
 
 
 def _region_lines(world: WorldModel, region: Region) -> Iterator[str]:
-    yield f"{region.id} is a {say_kind(region)}: {say_size(region)}."
+    yield f"{region.id} is {KINDS[region.id[0]]}: {say_size(region)}."
     yield (
         f"Floor {region.floor_area_m2:.1f} m2 with what stands on it, {region.free_area_m2:.1f} m2 "
         f"of it free; {_say_rank(world, region)}."
@@ -347,7 +347,7 @@ def describe_view(world: WorldModel, place: Place, picture: CameraPicture) -> st
         lines.append("By map and memory it shows, left to right:")
         lines += [_say_sight(each, picture, half_view_rad) for each in sights[:MOST_SIGHTS]]
     else:
-        lines.append("No door and no remembered thing should be in it.")
+        lines.append(f"No door and no remembered thing within {SIGHT_M:.0f} m should be in it.")
     if isinstance(place.thing, RememberedThing):
         lines.append(lead(CHECK))
     return "\n".join(filter(None, lines))
@@ -355,10 +355,13 @@ def describe_view(world: WorldModel, place: Place, picture: CameraPicture) -> st
 
 def _say_shown(place: Place, shown_ratio: float | None) -> str:
     if shown_ratio is None:
-        return f"Taken for {place.name}."
+        is_nowhere = isinstance(place.thing, RememberedThing)
+        where = " Nobody noted where it is." if is_nowhere else ""
+        return f"Taken for {place.name}.{where}"
     match place.thing:
         case Region():
-            return f"{shown_ratio:.0%} of the floor of {place.name} is in view."
+            more = "" if shown_ratio >= LOW_RATIO else lead(" {look_around} shows more.")
+            return f"{shown_ratio:.0%} of the floor of {place.name} is in view.{more}"
         case RememberedThing(id=thing_id):
             if shown_ratio >= ALL_RATIO:
                 return f"All of where {thing_id} may be is in view."

@@ -171,7 +171,7 @@ def _find_others(world: WorldModel, begin: Place, places: Sequence[str] | None) 
     if by_name:
         return list(by_name.values())
     raise GoalError(
-        f"There is nothing to measure from {begin.name} to.",
+        f"Only {begin.name} itself is named, where ways begin.",
         hint=lead("Name other places than the start, or explore. {look_at_map} shows more."),
     )
 

@@ -11,8 +11,8 @@ from mapspeak.memory.consistency.findings import WEIGHTS, FindingKind, Trust
 from mapspeak.memory.search.answer import EntryCandidate, EntryKind
 from mapspeak.places.goalcheck import GoalCheck, judge_goal
 from mapspeak.places.naming import Place
-from mapspeak.places.relations.choosing import stand_at
 from mapspeak.places.standing import find_overlook_of
+from mapspeak.places.ways import stand_at
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import Remembered, RememberedPlace, RememberedThing
 

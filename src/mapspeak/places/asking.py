@@ -11,8 +11,7 @@ from itertools import islice
 from mapspeak.geometry import Point
 from mapspeak.memory import Waypoint
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKind, Verdict
-from mapspeak.places.naming import Place, find_elsewhere
-from mapspeak.places.recall.candidate import (
+from mapspeak.places.candidate import (
     RecallCandidate,
     RecallDoubt,
     describe_candidate,
@@ -22,8 +21,9 @@ from mapspeak.places.recall.candidate import (
     last_seen,
     point_of,
 )
-from mapspeak.places.relations.choosing import stand_at
+from mapspeak.places.naming import Place, find_elsewhere
 from mapspeak.places.things import split_room
+from mapspeak.places.ways import stand_at
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import Remembered, RememberedPlace, RememberedThing
 
