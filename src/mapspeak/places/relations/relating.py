@@ -63,7 +63,7 @@ from mapspeak.places.relations.superlatives import (
     require_one,
 )
 from mapspeak.places.relations.vocabulary import pattern, plain
-from mapspeak.places.standing import reach_doors
+from mapspeak.places.standing import find_standing_point, reach_doors
 from mapspeak.places.ways import standing_point
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
@@ -261,9 +261,8 @@ class Reader:
         world, room = self._world, self._region_of(words, n_left)
         reached = reach_doors(world, world.rooms.doors_of(room))
         if not reached:
-            raise refuse(
-                f"The robot gets through no door of {room.id}.", [f"the middle of {room.id}"]
-            )
+            works = [room.id] if find_standing_point(world, room) is not None else []
+            raise refuse(f"The robot gets through no door of {room.id}.", works)
         _, door, _ = reached[0]
         at, why = standing_point(world, Place(room.id, room)), f"in {room.id}, facing {door.id}"
         sees = is_in_sight(world, np.array([[at.x, at.y]]), door.place)

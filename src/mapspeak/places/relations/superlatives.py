@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapspeak.places.goalcheck import judge_goal, say_check
 from mapspeak.places.naming import MOST_NAMED, AmbiguousPlaceError, Place
 from mapspeak.places.relations.grammar import Several, Superlative
 from mapspeak.places.relations.placement import refuse
@@ -13,6 +14,7 @@ from mapspeak.places.relations.referents import ROBOT, Referent, stands_at
 from mapspeak.places.relations.vocabulary import Kind, Order, say_order
 from mapspeak.places.standing import cells_of, stand_before
 from mapspeak.places.things import list_alike, place_of, say_candidates
+from mapspeak.places.ways import stand_at
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, Region, RoomClass
@@ -142,7 +144,7 @@ def _rank(
     is_unused = words.kind is None and not _list(world, words)
     if n_wanted <= len(ranked) or is_unused:
         return ranked, left_out
-    said = _say_too_few(world, words, len(ranked), n_all)
+    said = f"{_say_too_few(world, words, len(ranked), n_all)}{_say_closed(world, left_out)}"
     things = [
         each.thing for each in (*ranked, *left_out) if isinstance(each.thing, RememberedThing)
     ]
@@ -152,6 +154,19 @@ def _rank(
         those = [f"{say_order(words.order, n + 1)} {words.kind}" for n in range(len(ranked))]
         raise refuse(said, those)
     raise refuse(said, [each.thing.id for each in ranked[:MOST_NAMED]])
+
+
+def _say_closed(world: WorldModel, left_out: Sequence[Ranked]) -> str:
+    """Say what is closed that keeps the robot from the first of some things; nothing for none."""
+    if not world.map.areas:
+        return ""
+    opened = world.map.open.distances_from
+    for each in left_out[:MOST_NAMED]:
+        pose = stand_at(world, Place(each.thing.id, each.thing))
+        check = judge_goal(world.grid, world.distances, pose, opened=opened)
+        if check.areas:
+            return f" {each.thing.id}: {say_check(check)}"
+    return ""
 
 
 def _say_too_few(world: WorldModel, words: Words, n_found: int, n_all: int) -> str:

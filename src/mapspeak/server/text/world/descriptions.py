@@ -331,8 +331,9 @@ def _say_ground(world: WorldModel, place: Place) -> str:
     room = world.find_room_id(place.point) or "no room"
     if not world.grid.is_free(cell):
         return f"a wall or an obstacle, in {room}"
-    clear_m = float(world.map.clearance_m[cell.row, cell.col])
+    clear_m = float(world.map.open.clearance_m[cell.row, cell.col])
     clear = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m from any obstacle"
+    # That it is closed is told where the robot is said not to get there.
     return f"free floor in {room}, {clear}"
 
 

@@ -1,0 +1,45 @@
+"""What is said of places that a closure keeps the robot from."""
+
+import pytest
+
+from closing import RADIUS_M, event, revision_with, world_on
+from drawing import grid_from_text
+from guarding import corners
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMap
+from mapspeak.memory.events import Effect
+from mapspeak.places.relations.choosing import find_place
+from mapspeak.server.text.world.descriptions import describe_place
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.model import WorldModel
+
+SOUTH = corners((8.5, 1.0), (15.5, 3.5))
+BOTH = (event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(SOUTH,), id="E3"))
+
+
+def test_too_few_that_can_be_reached_are_told_with_what_is_closed() -> None:
+    world = world_on(revision_with(*BOTH))
+    with pytest.raises(GoalError, match="can be reached.* closed by event E"):
+        find_place(world, "second-nearest room")
+
+
+def test_where_no_door_is_passed_no_place_is_offered_that_does_not_work_either() -> None:
+    text = "\n".join(["############", *["#....#.....#"] * 5, "############"])
+    drawn = grid_from_text(text, resolution_m=1.0)
+    cells = drawn.cells.repeat(10, axis=0).repeat(10, axis=1).copy()
+    cells[30:34, 50:60] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.1)
+    world = WorldModel(grid, Pose(2.0, 3.0), SemanticMap(), radius_m=RADIUS_M)
+    # Its only door is too narrow.
+    (far,) = (each for each in world.rooms.regions if each.widest.x > 6.0)
+    with pytest.raises(GoalError, match="gets through no door") as caught:
+        find_place(world, f"{far.id} looking back through its door")
+    assert far.id not in caught.value.hint
+
+
+def test_closed_floor_is_as_far_from_obstacles_as_it_was() -> None:
+    world = world_on(revision_with(*BOTH))
+    told = describe_place(world, find_place(world, "12, 6.5"))
+    assert "0.00 m from any obstacle" not in told
+    assert "closed by event E2" in told
