@@ -20,7 +20,7 @@ BOTH = (event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(SOUTH,), i
 
 def test_too_few_that_can_be_reached_are_told_with_what_is_closed() -> None:
     world = world_on(revision_with(*BOTH))
-    with pytest.raises(GoalError, match="can be reached.* closed by event E"):
+    with pytest.raises(GoalError, match=r"can be reached.* closed by event E"):
         find_place(world, "second-nearest room")
 
 

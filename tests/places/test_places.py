@@ -77,7 +77,7 @@ def test_a_remembered_name_wins_over_coordinates_that_it_looks_like() -> None:
         ("1.5", "'nearest room'"),
         ("nan, 2", "'nearest room'"),
         ("left door of R1", "'all doors of R1'"),
-        ("somewhere to the left", "'2 m left of the robot'"),
+        ("somewhere to the left", "'left of the robot'"),
     ],
 )
 def test_a_place_that_is_not_there_is_answered_with_those_that_are(words: str, told: str) -> None:

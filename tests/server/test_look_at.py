@@ -117,7 +117,7 @@ async def test_a_thing_in_view_from_near_is_looked_at_from_where_the_robot_stand
     async with connect(robot, tmp_path) as client:
         await note_fridge(client)
         await client.call_tool("navigate_to", {"place": "T1"})
-        beside = robot.pose.transform(Point(-0.3, 0.3))
+        beside = robot.pose.transform(Point(-0.1, 0.3))
         robot.pose = Pose(beside.x, beside.y, robot.pose.yaw_rad - 0.2)
         before, n_goals = robot.pose, len(robot.goals)
         told = text_of(await client.call_tool("look_at", {"place": "T1"}))

@@ -1,9 +1,11 @@
 import math
 
+import numpy as np
 import pytest
 
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
+from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import (
     CorridorWalk,
     DoorSide,
@@ -193,3 +195,23 @@ def test_a_corridor_that_leads_all_around_is_walked_on_one_side_of_its_core() ->
     elsewhere = {stop.door_id for stop in walk.stops if stop.side is DoorSide.ELSEWHERE}
     assert elsewhere
     assert all((places[door_id].y > 5.2) != is_above for door_id in elsewhere)
+
+
+@pytest.mark.parametrize("niche", [slice(40, 40), slice(54, 60), slice(46, 54)])
+def test_doors_beside_the_end_of_a_corridor_come_in_their_order_whatever_its_shape(
+    niche: slice,
+) -> None:
+    cells = np.full((200, 120), 100, np.int8)
+    cells[10:170, 40:60] = 0
+    cells[5:45, 5:37] = cells[50:100, 5:37] = cells[5:60, 63:110] = cells[65:120, 63:110] = 0
+    cells[17:26, 37:40] = cells[16:25, 60:63] = cells[70:80, 37:40] = cells[90:100, 60:63] = 0
+    cells[10:14, niche] = 100
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.1))
+    (corridor,) = (each for each in rooms.regions if each.room_class is RoomClass.CORRIDOR)
+    walk = walk_along(rooms, corridor)
+    assert walk is not None
+    places_y = [next(d.place.y for d in rooms.doors if d.id == s.door_id) for s in walk.stops]
+    assert places_y == sorted(places_y)
+    along_m = [stop.along_m for stop in walk.stops]
+    assert along_m == pytest.approx([y - walk.start.y for y in places_y], abs=0.3)
+    assert walk.heading_rad == pytest.approx(math.pi / 2, abs=0.05)

@@ -299,7 +299,7 @@ def _list_phrases(world: WorldModel, wanted: str) -> Iterator[str]:
     yield from (f"all {kind}s" for kind in known)
     yield from (f"the middle of {each.id}" for each in regions[:1])
     yield "2 m in front of the robot"
-    yield "2 m left of the robot"
+    yield "left of the robot"
 
 
 def _say_guesses(guesses: Sequence[EntryCandidate]) -> str:

@@ -82,7 +82,7 @@ def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
     reached = _distances_from_end(floor, region)
     if reached is None:
         return None
-    line = _find_middle_line(*reached)
+    line = _straighten_ends(_find_middle_line(*reached), most_off_m=region.width_m / 2)
     doors = [door for door in rooms.doors if region.id in door.region_ids]
     stops = [_stop_at(line, region, door) for door in doors]
     return CorridorWalk(
@@ -187,6 +187,26 @@ def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
     # Means of slices shorten the way at its ends; no way is shorter than the straight line.
     stretch = max(1.0, straight_m / max(float(along_m[-1]), SLICE_M))
     return _Line(np.stack(means[:2], axis=1), along_m * stretch)
+
+
+def _straighten_ends(line: _Line, *, most_off_m: float) -> _Line:
+    """Return the line with both ends on the straight way that leads up to them.
+
+    What is as far from an end lies on an arc around it, often more of it on one side: there the
+    middles of slices lead askew past doors. Ends farther off that way lie in a bend, and stay.
+    """
+    points = line.points.copy()
+    cut_m = min(TANGENT_M / 2, line.length_m / 4)
+    for sign, is_end in ((1, line.along_m < cut_m), (-1, line.along_m > line.length_m - cut_m)):
+        from_m = cut_m if sign > 0 else line.length_m - cut_m
+        reach_m = min(TANGENT_M, line.length_m - 2 * cut_m)
+        corner = line.point_at(from_m)
+        heading_rad = corner.bearing_to(line.point_at(from_m + sign * reach_m))
+        normal = np.array([-math.sin(heading_rad), math.cos(heading_rad)])
+        aside_m = (points[is_end] - np.array([corner.x, corner.y])) @ normal
+        if np.abs(aside_m).max(initial=0.0) <= most_off_m:
+            points[is_end] -= aside_m[:, None] * normal
+    return _Line(points, line.along_m)
 
 
 def _stop_at(line: _Line, region: Region, door: Door) -> PassedDoor:
