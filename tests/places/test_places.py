@@ -173,6 +173,19 @@ def test_the_way_between_two_rooms_names_the_door_and_is_no_shorter_than_straigh
     assert way.path_m >= way.straight_m
 
 
+def test_a_way_through_a_door_has_no_more_room_than_half_of_the_door() -> None:
+    cells = np.zeros((60, 80), dtype=np.int8)
+    cells[:, :2] = cells[:2] = cells[:, -2:] = cells[-2:] = cells[:, 40:42] = 100
+    cells[22:37, 40:42] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    world = WorldModel(grid, Pose(1.0, 1.5), SemanticMap(), radius_m=0.2)
+    (door,) = world.rooms.doors
+    way = find_way(world, find_place(world, "robot"), find_place(world, "3.0, 1.5"))
+    assert door.id in way.through
+    assert way.clearance_m is not None
+    assert way.clearance_m <= door.width_m / 2
+
+
 def test_ways_are_as_long_there_as_back() -> None:
     world = _world()
     one, other = find_place(world, "R1"), find_place(world, "R2")

@@ -59,6 +59,10 @@ def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
     if distances is None or path is None:
         return Way(start=start, goal=goal, end=end, straight_m=straight_m)
     cells = _cells_along(world, path)
+    through = _name_regions(world, *cells)
+    # From cell to cell a door is as wide as its posts' middles are apart; none has more room than
+    # half of what is told as its width.
+    half_m = [door.width_m / 2 for door in world.rooms.doors if door.id in through]
     return Way(
         start=start,
         goal=goal,
@@ -66,8 +70,8 @@ def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
         straight_m=straight_m,
         # The way round is not the shortest one.
         path_m=path.length_m if world.map.weights is not None else distances.distance_to(end),
-        through=_name_regions(world, *cells),
-        clearance_m=float(world.map.clearance_m[cells].min()),
+        through=through,
+        clearance_m=min([float(world.map.clearance_m[cells].min()), *half_m]),
     )
 
 
