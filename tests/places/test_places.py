@@ -173,6 +173,12 @@ def test_the_way_between_two_rooms_names_the_door_and_is_no_shorter_than_straigh
     assert way.path_m >= way.straight_m
 
 
+def test_a_place_ahead_of_the_robot_is_come_to_straight_on() -> None:
+    world = _world()
+    goal = check_place(world, find_place(world, "1 m in front of the robot"))
+    assert abs(goal.pose.yaw_rad) < 0.2
+
+
 def test_a_way_through_a_door_has_no_more_room_than_half_of_the_door() -> None:
     cells = np.zeros((60, 80), dtype=np.int8)
     cells[:, :2] = cells[:2] = cells[:, -2:] = cells[-2:] = cells[:, 40:42] = 100

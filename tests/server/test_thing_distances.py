@@ -92,6 +92,16 @@ async def test_what_the_detector_reported_in_the_same_look_places_a_label(tmp_pa
     assert told_m == pytest.approx(2.0, abs=0.3)
 
 
+async def test_a_point_names_the_things_near_it(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await note_fridge(client)
+        near = text_of(await client.call_tool("describe_place", {"place": "6.0, 1.4"}))
+        far = text_of(await client.call_tool("describe_place", {"place": "0.6, 1.4"}))
+    assert 'T1 "fridge" at' in near
+    assert "T1" not in far
+    assert "W1 at" in far
+
+
 async def test_of_two_alike_in_a_picture_a_label_means_neither(tmp_path: Path) -> None:
     robot = seeing("chair", (10.0, -10.0))
     async with connect(robot, tmp_path) as client:

@@ -78,8 +78,11 @@ def stand_towards(
         )
     point, away_m = found
     edge = "" if thing.is_point else ", measured from its edge"
-    reason = f"{away_m:.1f} m {_say(wanted)} {thing.name}{aim.how}{edge}, facing it"
-    return stand(point, reason, point.bearing_to(thing.anchor))
+    reason = f"{away_m:.1f} m {_say(wanted)} {thing.name}{aim.how}{edge}"
+    if thing.name == ROBOT:
+        # It cannot face itself: it comes straight on.
+        return stand(point, reason)
+    return stand(point, f"{reason}, facing it", point.bearing_to(thing.anchor))
 
 
 def front_of_region(world: WorldModel, region: Region) -> Referent:

@@ -227,7 +227,9 @@ class RecallAnswer(Report):
         fitting = f"{self.n_fitting} fit{'s' * (self.n_fitting == 1)} {quote(self.understood)} best"
         heading = f"{len(self.candidates)} of {self.n_searched}, the likeliest first; {fitting}"
         lines = [self.advice]
-        for first in self.candidates[:1]:
+        # What is probably not meant is named in the advice; a table of such things would mislead.
+        is_table = self.verdict is not Verdict.NOT_REMEMBERED
+        for first in self.candidates[: int(is_table)]:
             lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))
             lines += [f"Trust in {first.id}: {' '.join(first.trust_why)}"] * bool(first.trust_why)
         return "\n".join([*lines, *self.warnings])

@@ -126,9 +126,9 @@ OBSERVED = (
 LINES = (
     (
         "Start with {look_at_map}: one call gives the map picture and, as text, the robot's pose, "
-        "rooms (R1), corridors (C1), doors (D1), frontiers to the unknown (F1) and remembered "
-        "places (W1), with areas and path distances. {look_at_map} has the same ids in picture and "
-        "text: pick an id, never a pixel."
+        "rooms (R1), open spaces (O1), corridors (C1), doors (D1), frontiers to the unknown (F1) "
+        "and remembered places (W1), with areas and path distances. {look_at_map} has the same ids "
+        "in picture and text: pick an id, never a pixel."
     ),
     (
         "{find_place} finds a remembered place or thing (T1) by name or by what it is for: take it "

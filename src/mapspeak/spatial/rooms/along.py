@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from mapspeak.geometry import Point, wrap_angle
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.spatial.grid import FloatArray, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, distances_from, known_clearance_m
 from mapspeak.spatial.paths.lattice import measure_away
@@ -182,11 +182,14 @@ def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
         np.bincount(number, weights=values, minlength=n)[sizes > 0] / sizes[sizes > 0]
         for values in (points[:, 0], points[:, 1], away_m)
     ]
-    along_m = means[2] - means[2][0]
-    straight_m = math.hypot(means[0][-1] - means[0][0], means[1][-1] - means[1][0])
-    # Means of slices shorten the way at its ends; no way is shorter than the straight line.
+    return _stretch(np.stack(means[:2], axis=1), means[2] - means[2][0])
+
+
+def _stretch(points: FloatArray, along_m: FloatArray) -> _Line:
+    """Return the line: means of slices shorten a way, and none is shorter than straight."""
+    straight_m = math.hypot(*(points[-1] - points[0]))
     stretch = max(1.0, straight_m / max(float(along_m[-1]), SLICE_M))
-    return _Line(np.stack(means[:2], axis=1), along_m * stretch)
+    return _Line(points, along_m * stretch)
 
 
 def _straighten_ends(line: _Line, *, most_off_m: float) -> _Line:
@@ -195,18 +198,32 @@ def _straighten_ends(line: _Line, *, most_off_m: float) -> _Line:
     What is as far from an end lies on an arc around it, often more of it on one side: there the
     middles of slices lead askew past doors. Ends farther off that way lie in a bend, and stay.
     """
-    points = line.points.copy()
     cut_m = min(TANGENT_M / 2, line.length_m / 4)
+    reach_m = min(TANGENT_M, line.length_m - 2 * cut_m)
+    is_inner = np.abs(line.along_m - line.length_m / 2) <= line.length_m / 2 - cut_m
+    known = [(line.points[is_inner], line.along_m[is_inner])]
     for sign, is_end in ((1, line.along_m < cut_m), (-1, line.along_m > line.length_m - cut_m)):
         from_m = cut_m if sign > 0 else line.length_m - cut_m
-        reach_m = min(TANGENT_M, line.length_m - 2 * cut_m)
         corner = line.point_at(from_m)
-        heading_rad = corner.bearing_to(line.point_at(from_m + sign * reach_m))
-        normal = np.array([-math.sin(heading_rad), math.cos(heading_rad)])
-        aside_m = (points[is_end] - np.array([corner.x, corner.y])) @ normal
-        if np.abs(aside_m).max(initial=0.0) <= most_off_m:
-            points[is_end] -= aside_m[:, None] * normal
-    return _Line(points, line.along_m)
+        inward = Pose(
+            corner.x, corner.y, corner.bearing_to(line.point_at(from_m + sign * reach_m))
+        ).inverse()
+        ahead_m, aside_m = np.array(
+            [
+                (at.x, at.y)
+                for at in (inward.transform(Point(*xy)) for xy in line.points[is_end].tolist())
+            ]
+        ).T
+        if np.abs(aside_m).max() > most_off_m:
+            known.append((line.points[is_end], line.along_m[is_end]))
+            continue
+        out_m = float(ahead_m.min())
+        end = inward.inverse().transform(Point(out_m, 0.0))
+        ends = np.array([[corner.x, corner.y], [end.x, end.y]])
+        known.append((ends, np.array([from_m, from_m + sign * out_m])))
+    points, along_m = (np.concatenate(each) for each in zip(*known, strict=True))
+    order = np.argsort(along_m, kind="stable")
+    return _stretch(points[order], along_m[order] - along_m.min())
 
 
 def _stop_at(line: _Line, region: Region, door: Door) -> PassedDoor:

@@ -18,6 +18,7 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import (
     KINDS,
     join_words,
+    list_some,
     say_count,
     say_path,
     say_point,
@@ -147,6 +148,7 @@ def _quote_all(texts: Sequence[str]) -> str:
 
 
 NEAR_M = 5.0
+MOST_NEAR = 6
 
 
 def describe_place(world: WorldModel, place: Place) -> str:
@@ -308,16 +310,17 @@ def _say_remembered(remembered: RememberedPlace) -> str:
 def _spot_lines(world: WorldModel, place: Place) -> Iterator[str]:
     point = place.point
     yield f"{place.name} is at {say_point(point)}: {_say_ground(world, place)}."
-    near = [
-        f"{each.id} at {point.distance_to(each.waypoint.pose.point):.1f} m"
-        for each in world.places
-        if point.distance_to(each.waypoint.pose.point) <= NEAR_M
-    ]
+    places = ((each.waypoint.pose.point, each.id) for each in world.places)
+    things = (
+        (each.thing.position, f"{each.id} {quote(each.thing.label)}") for each in world.things
+    )
+    away = ((point.distance_to(at), name) for at, name in (*things, *places) if at is not None)
+    near = [f"{name} at {away_m:.1f} m" for away_m, name in sorted(away) if away_m <= NEAR_M]
     doors = sorted(world.rooms.doors, key=lambda door: point.distance_to(door.place))
     if doors:
         yield f"Nearest door: {doors[0].id}, {point.distance_to(doors[0].place):.1f} m off."
     if near:
-        yield f"Remembered places within {NEAR_M:.0f} m: {', '.join(near)}."
+        yield f"Remembered within {NEAR_M:.0f} m: {list_some(near, most=MOST_NEAR)}."
 
 
 def _say_ground(world: WorldModel, place: Place) -> str:
