@@ -214,15 +214,15 @@ class PlaceGraph:
 def _sum_up(basins: Basins, raster: Raster, n: int) -> FloatArray:
     """Return for each basin how many cells it has, their moments, clearances and outer edges."""
     unseen = (raster.free | raster.occupied) == 0
-    # By runs of cells along rows; the column added divides the rows.
-    labels = np.pad(basins.labels, ((0, 0), (1, 0)))
+    # By runs of cells along rows, which the frame divides.
+    labels = basins.labels
     starts = np.flatnonzero(labels.ravel()[1:] != labels.ravel()[:-1]) + 1
     of_run = labels.ravel()[starts]
     row, first = np.divmod(starts, labels.shape[1])
     length = np.diff(starts, append=labels.size)
-    heights = np.pad(basins.heights, ((0, 0), (1, 0))).ravel()
+    heights = basins.heights.ravel()
     clearance = np.add.reduceat(heights, starts, dtype=np.float64) if starts.size else starts
-    middle = first - 1 + (length - 1) / 2
+    middle = first + (length - 1) / 2
     # The squares of a run's columns sum up to that of its middle, and of a run around 0.
     squares = length * (middle**2 + (length**2 - 1) / 12)
     moments = (length * row, length * middle, length * row**2, squares, length * row * middle)

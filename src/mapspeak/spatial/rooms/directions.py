@@ -12,6 +12,8 @@ MAX_DIRECTIONS = 8
 _LEAST_RATIO = 0.2
 """A main direction has at least this share of the strongest one's edges."""
 _EDGE_BLUR_CELLS = 1.5
+_MARGIN_CELLS = 8
+"""The blur of an edge reaches no farther."""
 _BELL_DEG = 2.0
 _APART_DEG = 6
 """Main directions differ by more than this."""
@@ -82,7 +84,8 @@ def _angle_histogram(occupied: NDArray[np.uint8]) -> FloatArray:
 
 def _find_edges(occupied: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
     """Return the angles of the gradients at edges, in degrees, and how strong they are."""
-    soft = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), _EDGE_BLUR_CELLS)
+    framed = np.pad(occupied, _MARGIN_CELLS).astype(np.float32)
+    soft = cv2.GaussianBlur(framed, (0, 0), _EDGE_BLUR_CELLS)
     across = cv2.Sobel(soft, cv2.CV_32F, 1, 0)
     along = cv2.Sobel(soft, cv2.CV_32F, 0, 1)
     strength, angle_deg = cv2.cartToPolar(across, along, angleInDegrees=True)

@@ -113,11 +113,8 @@ def _unseen_share(raster: Raster, inside: Mask, window: Window) -> float:
         inside.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
     )
     outline = cv2.dilate(region, np.ones((3, 3), np.uint8)) > region
-    rows, cols = (slice(max(part.start - 1, 0), part.stop + 1) for part in window)
-    seen = np.zeros(region.shape, np.uint8)
-    part = raster.free[rows, cols] | raster.occupied[rows, cols]
-    top, left = (int(side.start == 0) for side in window)
-    seen[top : top + part.shape[0], left : left + part.shape[1]] = part
+    rows, cols = (slice(part.start - 1, part.stop + 1) for part in window)
+    seen = raster.free[rows, cols] | raster.occupied[rows, cols]
     return float((seen[outline] == 0).mean())
 
 

@@ -90,17 +90,16 @@ def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
 
 def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
     """Return the distance from each cell's centre to the edge of the nearest cell off the floor."""
-    cells = measure_away(np.pad(floor, 1) == 0)
-    to_edge = np.maximum(cells[1:-1, 1:-1] - 0.5, 0.0) * cell_size_m
-    return np.ascontiguousarray(to_edge, dtype=np.float32)
+    to_edge = np.maximum(measure_away(floor == 0) - 0.5, 0.0) * cell_size_m
+    return np.asarray(to_edge, dtype=np.float32)
 
 
 def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
-    """Return the small unseen areas that border on floor more than on wall."""
+    """Return the small unseen areas inside that border on floor more than on wall."""
     unseen = (1 - floor) & (1 - wall)
     n, label = label_parts(unseen, connectivity=4)
     small = np.bincount(label.ravel(), minlength=n) < largest
-    small[0] = False
+    small[0] = small[label[0, 0]] = False
     border = np.zeros(n)
     at_wall = np.zeros(n)
     for here, there in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
@@ -160,10 +159,10 @@ def _open(picture: Picture, length: float, angle_deg: float) -> Picture:
     some = kernel * (np.cumsum(kernel).reshape(kernel.shape) % _SIEVE == 0)
     cells = np.flatnonzero(np.asarray(cv2.erode(picture, some)).view(np.bool_))
     if cells.size > _FEW_CELLS:
-        core = cv2.erode(picture, kernel)
+        core = cv2.erode(picture, kernel, borderType=cv2.BORDER_CONSTANT, borderValue=(0,))
         return np.asarray(cv2.dilate(core, kernel), np.uint8)
     high, wide = (side // 2 for side in kernel.shape)
-    framed = np.pad(picture, ((high, high), (wide, wide)), constant_values=1)
+    framed = np.pad(picture, ((high, high), (wide, wide)))
     rows, cols = np.divmod(cells, picture.shape[1])
     middles = (rows + high) * framed.shape[1] + cols + wide
     steps = (np.nonzero(kernel)[0] - high) * framed.shape[1] + np.nonzero(kernel)[1] - wide
@@ -193,13 +192,11 @@ def _sort_obstacles(free: Picture, largest_island: float) -> tuple[Picture, Pict
     An island is an obstacle that can be driven around. A piece of wall is slender; a pillar, a
     chair and a box are not.
     """
-    solid = np.pad(1 - free, 1, constant_values=1)
-    n, label = label_parts(solid, connectivity=8)
+    n, label = label_parts(1 - free, connectivity=8)
     low, high = find_boxes(label, n)
     across = np.hypot(*(high - low))
     is_large = across >= largest_island
     is_slender = np.bincount(label.ravel(), minlength=n) <= SLENDER_RATIO * across**2
     is_large[0] = is_slender[0] = False
-    label = label[1:-1, 1:-1]
     large, slender = (np.take(kept.view(np.uint8), label) for kept in (is_large, is_slender))
     return large, slender

@@ -94,6 +94,8 @@ MAX_UPSCALING = 4
 class Raster:
     """The known part of a map at a working resolution, turned so that its walls are upright.
 
+    A frame of one unseen cell around it stands for all that lies beyond.
+
     Attributes:
         free: 1 where a robot can be, else 0.
         occupied: 1 on obstacles, else 0.
@@ -169,16 +171,14 @@ def build_raster(grid: OccupancyGrid) -> Raster:
         )
     is_known = grid.cells >= 0
     rows, cols = _extent(np.any(is_known, axis=1)), _extent(np.any(is_known, axis=0))
-    known = grid.cells[rows, cols]
-    shrink, grow = _factors(known.shape, grid.resolution_m)
-    if known.size == 0:
-        known = np.full((1, 1), UNKNOWN, np.int8)
+    shrink, grow = _factors(grid.cells[rows, cols].shape, grid.resolution_m)
+    known = np.pad(grid.cells[rows, cols], shrink, constant_values=UNKNOWN)
     cell_size_m = grid.resolution_m * shrink / grow
     free, occupied = (
         np.asarray(mask, np.uint8)
         for mask in ((known >= 0) & (known <= FREE_MAX), known > FREE_MAX)
     )
-    there = _shift(cols.start, rows.start)
+    there = _shift(cols.start - shrink, rows.start - shrink)
     off_deg = find_main_direction(_resize(occupied, shrink=shrink, grow=grow, full=False))
     if abs(off_deg) > UPRIGHT_DEG:
         turn, size = _find_turn(known.shape, off_deg, grow / shrink)
@@ -186,8 +186,8 @@ def build_raster(grid: OccupancyGrid) -> Raster:
         occupied = _settle(_turn(occupied, turn, size, shrink), _LEAST_COVER)
         used = (free | occupied) > 0
         rows, cols = _extent(np.any(used, axis=1)), _extent(np.any(used, axis=0))
-        free, occupied = free[rows, cols], occupied[rows, cols]
-        there = _shift(cols.start, rows.start) @ turn @ there
+        free, occupied = (np.pad(part[rows, cols], 1) for part in (free, occupied))
+        there = _shift(cols.start - 1, rows.start - 1) @ turn @ there
     else:
         free = _resize(free, shrink=shrink, grow=grow, full=True)
         occupied = _resize(occupied, shrink=shrink, grow=grow, full=False)
@@ -298,7 +298,9 @@ def open_box(picture: Picture, high: int, wide: int) -> Picture:
 def close_box(picture: Picture, side: int) -> Picture:
     """Return the set cells, and gaps between them that no square of this many cells fits into."""
     box = np.ones((side, side), np.uint8)
-    return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_CLOSE, box), np.uint8)
+    # Beyond the picture nothing is set, which OpenCV takes for set when it erodes.
+    closed = cv2.morphologyEx(np.pad(picture, side), cv2.MORPH_CLOSE, box)
+    return np.asarray(closed[side:-side, side:-side], np.uint8)
 
 
 def widen(picture: Picture, cells: int) -> Picture:
@@ -371,16 +373,14 @@ def drop_specks(free: Picture, least: float) -> Picture:
 
 def drop_small(solid: Picture, least: float) -> Picture:
     """Return solid cells without smaller pieces that have floor all around."""
-    framed = np.pad(solid, 1, constant_values=1)
-    n, label = label_parts(framed, connectivity=8)
+    n, label = label_parts(solid, connectivity=8)
     low, high = find_boxes(label, n)
     is_kept = np.hypot(*(high - low)) >= least
     is_kept[0] = False
-    return np.take(is_kept.view(np.uint8), label[1:-1, 1:-1])
+    return np.take(is_kept.view(np.uint8), label)
 
 
 def find_fixed(solid: Picture) -> Picture:
-    """Return the cells connected to the outside of the picture."""
-    framed = np.pad(solid, 1, constant_values=1)
-    _, label = label_parts(framed, connectivity=8)
-    return np.asarray(label[1:-1, 1:-1] == label[0, 0], np.uint8)
+    """Return the cells connected to the frame of the raster, which is solid."""
+    _, label = label_parts(solid, connectivity=8)
+    return np.asarray(label == label[0, 0], np.uint8)

@@ -250,7 +250,7 @@ def find_borders(
 
 
 def _smooth(clearance_m: NDArray[np.float32], floor: Picture, sigma: float) -> NDArray[np.float32]:
-    smooth = cv2.GaussianBlur(clearance_m, (0, 0), sigma)
+    smooth = cv2.GaussianBlur(clearance_m, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
     return np.where(floor > 0, smooth, np.float32(0))
 
 
@@ -301,13 +301,13 @@ def _number_at(numbers: Labels, place: tuple[int, int]) -> int:
 
 def fill_cuts(labels: Labels, cut: Picture) -> Labels:
     """Add the cells of a cut to the regions beside it."""
-    rows, cols = (places + 1 for places in find_cells(cut > 0))
-    framed = cv2.copyMakeBorder(labels, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    rows, cols = find_cells(cut > 0)
+    filled = labels.copy()
     for _ in range(_CUT_CELLS + 1):
-        own = framed[rows, cols]
-        beside = [framed[rows + down, cols + right] for down, right in _STEPS]
-        framed[rows, cols] = np.where(own > 0, own, np.max(beside, axis=0))
-    return np.ascontiguousarray(framed[1:-1, 1:-1])
+        own = filled[rows, cols]
+        beside = [filled[rows + down, cols + right] for down, right in _STEPS]
+        filled[rows, cols] = np.where(own > 0, own, np.max(beside, axis=0))
+    return filled
 
 
 _STEPS = ((-1, 0), (1, 0), (0, -1), (0, 1))
