@@ -164,6 +164,38 @@ def furnished(seed: int) -> Cells:
     return cells
 
 
+def disc() -> Cells:
+    """Draws 12.6 m2 of floor with nothing seen around it, tightly cropped."""
+    rows, cols = np.mgrid[:81, :81] - 40
+    return np.where(np.hypot(rows, cols) <= 40, 0, -1).astype(np.int8)
+
+
+def half_seen() -> Cells:
+    """Draws the building up to where rays fan out, and a corner of it that no ray has reached."""
+    cells = building()
+    rows, cols = np.mgrid[:N_ROWS, :N_COLS]
+    cells[cols > 200 + 40 * np.cos(rows / 6)] = -1
+    cells[:24, :20] = -1
+    return cells
+
+
+@pytest.mark.parametrize("cells", [building(), furnished(1), furnished(4), disc(), half_seen()])
+@pytest.mark.parametrize("beyond", [6, 60])
+def test_specks_seen_far_beyond_a_map_change_nothing(cells: Cells, beyond: int) -> None:
+    wider = np.pad(cells, beyond, constant_values=-1)
+    wider[1:4, 1:4] = wider[-4:-1, -4:-1] = 0
+
+    found = divide(wider).labels
+
+    assert np.array_equal(found[beyond:-beyond, beyond:-beyond], divide(cells).labels)
+
+
+def test_unseen_corners_of_a_map_are_no_floor() -> None:
+    (region,) = divide(disc()).regions
+
+    assert region.floor_area_m2 == pytest.approx(region.free_area_m2)
+
+
 @pytest.mark.parametrize("seed", [1, 4])
 def test_a_map_upside_down_has_its_walls_and_floor_upside_down(seed: int) -> None:
     upright, inverted = (

@@ -22,6 +22,7 @@ from mapspeak.spatial.rooms.raster import (
     drop_specks,
     find_boxes,
     find_cells,
+    find_touching,
     label_parts,
     widen,
 )
@@ -123,7 +124,8 @@ SLENDER_RATIO = 0.37
 def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Picture]:
     """Return 1 where an obstacle is wall, and 1 where it cannot be a free-standing island.
 
-    Wall is a long run in a main direction, or in line with one.
+    Wall is a long run in a main direction, or in line with one, and one of half that length that
+    ends at a wall.
 
     A run of twice that length is wall in any direction, and so are long curved walls. An
     obstacle thicker than a wall, such as a cupboard, is not part of a wall that it is in line with.
@@ -132,25 +134,30 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
     occupied = raster.occupied
     thick = widen(occupied, 1)
     large, slender = _sort_obstacles(raster.free, SETTINGS.island_size_m / size_m)
-    side = max(round(SETTINGS.wall_thickness_m / size_m), 1)
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    is_thick = np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8)
-    can_be_piece = (large | slender) & (1 - is_thick)
-    wall = np.zeros_like(occupied)
+    can_be_piece = _find_thinner(occupied, SETTINGS.wall_thickness_m / size_m) & (large | slender)
+    can_be_stub = _find_thinner(occupied, SETTINGS.tip_m / size_m + 1) & (large | slender)
+    wall, stub = np.zeros_like(occupied), np.zeros_like(occupied)
     for angle_deg in directions_deg:
         for turned_deg in (angle_deg, angle_deg + 90):
             long_run = _open(thick, SETTINGS.wall_length_m / size_m, turned_deg) & occupied & large
-            piece = (
-                _open(thick, SETTINGS.wall_piece_m / size_m, turned_deg) & occupied & can_be_piece
-            )
+            piece = _open(thick, SETTINGS.wall_piece_m / size_m, turned_deg) & can_be_piece
             reach = _line(2 * SETTINGS.wall_reach_m / size_m, turned_deg)
             in_line = np.asarray(cv2.dilate(long_run, reach), np.uint8)
             wall |= long_run | (piece & in_line)
+            stub |= _open(thick, SETTINGS.wall_length_m / 2 / size_m, turned_deg)
     any_way = np.zeros_like(occupied)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
         any_way |= _open(thick, SETTINGS.oblique_length_m / size_m, turned_deg)
     obstacle = occupied & large
-    return wall | (any_way & obstacle), obstacle
+    wall |= any_way & obstacle
+    return wall | find_touching(stub & can_be_stub, wall), obstacle
+
+
+def _find_thinner(occupied: Picture, cells: float) -> Picture:
+    """Return the obstacles that no disc of this many cells across fits into."""
+    side = max(round(cells), 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return occupied & (1 - np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8))
 
 
 def _open(picture: Picture, length: float, angle_deg: float) -> Picture:

@@ -18,6 +18,7 @@ from mapspeak.spatial.rooms.raster import (
     drop_specks,
     find_boxes,
     find_fixed,
+    find_touching,
     is_near,
     is_short,
     label_parts,
@@ -35,6 +36,8 @@ _CRUMB_M = 1.0
 """Remains of an obstacle without its blocks are crumbs if smaller across than this."""
 _FILLED_RATIO = 0.7
 """Least share that a block at a wall fills of its rectangle, square to the walls."""
+_SEEN_RATIO = 0.5
+"""Least share of that rectangle's sides towards floor where an obstacle was seen."""
 _WHOLE_RATIO = 0.85
 """Obstacles at a wall longer than this share of the limit may go on: they are not blocks."""
 
@@ -55,8 +58,22 @@ def find_blocks(raster: Raster, wall: Picture, *, longest_m: float) -> tuple[Pic
     """
     solid = 1 - drop_specks(raster.free, _SPECK_M2 / raster.cell_area_m2)
     joined = find_fixed(solid)
-    sizes = _Sizes(solid, joined, raster.cell_size_m, longest_m)
-    block, behind = _find_blocks(solid, wall, sizes, joined)
+    cells = _Sizes(solid, joined, raster.cell_size_m, longest_m)
+    if cells.thin >= cells.thick:
+        return np.zeros_like(solid), np.zeros_like(solid)
+    bump = open_box(_find_bumps(solid, cells), cells.thin, cells.thin)
+    if not bump.any():
+        return bump, bump
+    behind = _continue_walls(solid, bump, wall, cells)
+    piece = open_box(bump & (1 - behind), cells.depth, cells.depth)
+    rest = solid & (1 - piece)
+    fixed = drop_small(rest, cells.crumb)
+    block = _choose_blocks(piece, fixed, raster.occupied, solid, cells)
+    crumb = rest & (1 - fixed)
+    block |= find_touching(crumb & (1 - joined), block)
+    block |= widen(block, cells.rim) & crumb
+    # Nothing sees what lies between two blocks, so that no bump begins there.
+    behind &= (bump & widen(block, cells.tip)) | close_box(block, 2 * cells.tip + 1)
     return block, behind & (1 - block)
 
 
@@ -97,31 +114,6 @@ def _find_wall_thickness(solid: Picture, fixed: Picture, most: int, least: float
     all_of_them = np.concatenate(found)
     # This little may be all furniture, in a room without inner walls.
     return float(np.median(all_of_them)) if all_of_them.size >= least else 0.0
-
-
-def _find_blocks(
-    solid: Picture, seen_wall: Picture, cells: _Sizes, joined: Picture
-) -> tuple[Picture, Picture]:
-    """Return the same as `find_blocks`.
-
-    Args:
-        joined: 1 on what is connected to the outside of the picture.
-    """
-    if cells.thin >= cells.thick:
-        return np.zeros_like(solid), np.zeros_like(solid)
-    bump = open_box(_find_bumps(solid, cells), cells.thin, cells.thin)
-    if not bump.any():
-        return bump, bump
-    wall = _continue_walls(solid, bump, seen_wall, cells)
-    piece = open_box(bump & (1 - wall), cells.depth, cells.depth)
-    rest = solid & (1 - piece)
-    fixed = drop_small(rest, cells.crumb)
-    block = _choose_blocks(piece, fixed, solid, cells)
-    crumb = rest & (1 - fixed)
-    block |= _find_touching(crumb & (1 - joined), block)
-    block |= widen(block, cells.rim) & crumb
-    # Nothing sees what lies between two blocks, so that no bump begins there.
-    return block, wall & ((bump & widen(block, cells.tip)) | close_box(block, 2 * cells.tip + 1))
 
 
 def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
@@ -185,7 +177,9 @@ def _find_stubs(
 # --- choice ----------------------------------------------------------------------------------
 
 
-def _choose_blocks(piece: Picture, fixed: Picture, solid: Picture, cells: _Sizes) -> Picture:
+def _choose_blocks(
+    piece: Picture, fixed: Picture, occupied: Picture, solid: Picture, cells: _Sizes
+) -> Picture:
     """Return the pieces that are furniture."""
     n, numbers = label_parts(piece, connectivity=4)
     floor = 1 - solid
@@ -194,7 +188,9 @@ def _choose_blocks(piece: Picture, fixed: Picture, solid: Picture, cells: _Sizes
     around = np.asarray(grown, np.int32)
     n_contact = np.bincount(around[fixed > 0], minlength=n)
     is_at_wall = _fills_rectangle(numbers, n, cells) & (n_contact >= cells.depth)
-    is_block = (n_contact == 0) | is_at_wall
+    rim = numbers * widen(floor, 1)
+    n_rim, n_seen = (np.bincount(each.ravel(), minlength=n) for each in (rim, rim * occupied))
+    is_block = (n_contact == 0) | (is_at_wall & (n_seen >= _SEEN_RATIO * n_rim))
     is_block &= _count_sides(around, n, floor, piece, cells) == 1
     is_block[numbers[open_box(piece, cells.thick, cells.thick) > 0]] = False
     is_block[0] = False
@@ -221,12 +217,3 @@ def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:
     is_whole = np.maximum(*spans) < _WHOLE_RATIO * cells.long
     filled = np.bincount(label.ravel(), minlength=n) >= _FILLED_RATIO * spans[0] * spans[1]
     return np.asarray(is_whole & filled)
-
-
-def _find_touching(crumbs: Picture, block: Picture) -> Picture:
-    """Return the crumbs that touch a block."""
-    n, label = label_parts(crumbs, connectivity=8)
-    touches = np.zeros(n, np.uint8)
-    touches[label[widen(block, 1) > 0]] = 1
-    touches[0] = 0
-    return np.asarray(touches[label], np.uint8)

@@ -181,7 +181,7 @@ def build_raster(grid: OccupancyGrid) -> Raster:
     there = _shift(cols.start - shrink, rows.start - shrink)
     off_deg = find_main_direction(_resize(occupied, shrink=shrink, grow=grow, full=False))
     if abs(off_deg) > UPRIGHT_DEG:
-        turn, size = _find_turn(known.shape, off_deg, grow / shrink)
+        turn, size = _find_turn(known.shape, off_deg, grow, shrink)
         free = (_turn(free, turn, size, shrink) >= _HALF_COVER).astype(np.uint8)
         occupied = _settle(_turn(occupied, turn, size, shrink), _LEAST_COVER)
         used = (free | occupied) > 0
@@ -207,13 +207,16 @@ def _shift(col: int, row: int) -> Affine:
 
 
 def _find_turn(
-    shape: tuple[int, ...], angle_deg: float, scale: float
+    shape: tuple[int, ...], angle_deg: float, grow: int, shrink: int
 ) -> tuple[Affine, tuple[int, int]]:
-    """Return the transform to a picture with walls of this direction upright, and its size."""
-    high, wide = shape
-    cosine, sine = (scale * part(math.radians(angle_deg)) for part in (math.cos, math.sin))
+    """Return the transform to a picture with walls of this direction upright, and its size.
+
+    The frame of unseen cells, as many as the picture is shrunk by, is left behind.
+    """
+    high, wide = (side - shrink for side in shape)
+    cosine, sine = (grow / shrink * part(math.radians(angle_deg)) for part in (math.cos, math.sin))
     turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    corners = np.array([[0, 0, 1], [wide, 0, 1], [0, high, 1], [wide, high, 1]]) @ turn.T
+    corners = np.array([(x, y, 1) for x in (shrink, wide) for y in (shrink, high)]) @ turn.T
     turn[:2, 2] = -corners.min(axis=0)[:2]
     across, along = np.ceil(np.ptp(corners, axis=0)[:2]).astype(int).tolist()
     return turn, (across, along)
@@ -378,6 +381,15 @@ def drop_small(solid: Picture, least: float) -> Picture:
     is_kept = np.hypot(*(high - low)) >= least
     is_kept[0] = False
     return np.take(is_kept.view(np.uint8), label)
+
+
+def find_touching(picture: Picture, others: Picture) -> Picture:
+    """Return the parts of a picture that touch set cells of another."""
+    n, label = label_parts(picture, connectivity=8)
+    touches = np.zeros(n, np.uint8)
+    touches[label[widen(others, 1) > 0]] = 1
+    touches[0] = 0
+    return np.asarray(touches[label], np.uint8)
 
 
 def find_fixed(solid: Picture) -> Picture:
