@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drawing import grid_from_text
-from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.grid import FloatArray, OccupancyGrid
 from mapspeak.spatial.rooms import find_rooms
 from mapspeak.spatial.rooms.basins import Basins, find_passes
 from mapspeak.spatial.rooms.borders import MEASURES, PlaceGraph
@@ -171,3 +171,12 @@ def test_a_region_behind_a_door_in_a_wall_is_sure() -> None:
 
     assert len(rooms.regions) == 2
     assert [rooms.find_doubtful_door(region) for region in rooms.regions] == [None, None]
+
+
+def test_short_walls_beside_a_door_divide_rooms_of_a_house_within_a_hall() -> None:
+    cells = grid_from_text(TWO_ROOMS, resolution_m=CELL_M).cells
+    wider = np.pad(cells, 30, constant_values=0)
+
+    rooms = find_rooms(OccupancyGrid(cells=wider, resolution_m=CELL_M))
+
+    assert len(rooms.regions) == 3
