@@ -64,6 +64,8 @@ class GoalCheck:
 
 FARTHEST_M = 1e6
 """No map is that large; larger numbers are typing errors, and overflow cell indices."""
+SEARCH_M = 8.0
+"""How far around a goal another one is looked for first."""
 CLEAR_M = 8.0
 """How far around a goal an obstacle is looked for at all."""
 TOLD_M = 0.01
@@ -181,19 +183,47 @@ def _find_closing(
 
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
     """Find the pose nearest to a goal, as the crow flies, that passes the same check."""
-    rows, cols = np.nonzero(distances.reachable)
+    centre = _into(grid, goal.point)
+    near = grid.window_around(centre, SEARCH_M + 2 * grid.resolution_m)
+    # What lies outside of that is farther from the goal than so much.
+    nearest_outside_m = math.hypot(SEARCH_M, centre.distance_to(goal.point))
+    found = _find_nearest_in(near, grid, distances, goal, within_m=nearest_outside_m)
+    whole = slice(0, grid.n_rows), slice(0, grid.n_cols)
+    return found or _find_nearest_in(whole, grid, distances, goal, within_m=math.inf)
+
+
+def _find_nearest_in(
+    window: tuple[slice, slice],
+    grid: OccupancyGrid,
+    distances: DistanceField,
+    goal: Pose,
+    *,
+    within_m: float,
+) -> Pose | None:
+    rows, cols = np.nonzero(distances.reachable[window])
+    rows, cols = rows + window[0].start, cols + window[1].start
     points = grid.points_at(rows, cols)
     if grid.resolution_m < 2 * TOLD_M:
         # What is told of a pose must lie in a cell that works, too.
         points = points.round(2)
     is_tight = distances.clearances_m[rows, cols] < distances.radius_m + SPARE_M
     off_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y) + TIGHT_OFF_M * is_tight
-    first = (
-        np.argpartition(off_m, MOST_TRIED)[:MOST_TRIED] if len(off_m) > MOST_TRIED else slice(None)
-    )
-    nearest = points[first][np.argsort(off_m[first], kind="stable")].tolist()
+    points, off_m = points[off_m <= within_m], off_m[off_m <= within_m]
+    if len(off_m) > MOST_TRIED:
+        first = np.argpartition(off_m, MOST_TRIED)[:MOST_TRIED]
+        points, off_m = points[first], off_m[first]
+    nearest = points[np.argsort(off_m, kind="stable")].tolist()
     poses = (Pose(x, y, goal.yaw_rad) for x, y in nearest)
     return next((pose for pose in poses if judge_goal(grid, distances, pose).is_ok), None)
+
+
+def _into(grid: OccupancyGrid, point: Point) -> Point:
+    """Return the point itself, or the centre of the nearest cell where it lies off the map."""
+    cell = grid.cell_at(point)
+    if grid.contains(cell):
+        return point
+    row, col = np.clip((cell.row, cell.col), 0, (grid.n_rows - 1, grid.n_cols - 1)).tolist()
+    return grid.point_at(Cell(row, col))
 
 
 def is_in_wall(grid: OccupancyGrid, point: Point) -> bool:
