@@ -386,6 +386,23 @@ def test_what_the_model_says_of_a_view_counts_more_than_what_stands_there() -> N
     assert opinions.score_at(Point(0.0, 0.0), ids=()) < 0.5
 
 
+async def test_what_the_detector_reports_where_the_robot_has_arrived_is_told_as_reported(
+    tmp_path: Path, flat: World
+) -> None:
+    robot = ReportingRobot(flat, label="fridge")
+    searcher = Searcher(session_of(robot, tmp_path))
+    for _ in range(4):
+        standing = await _step(robot, searcher, "fridge", Judgement())
+        assert standing.state is SearchState.REPORTED
+
+
+@pytest.mark.parametrize("region_id", ["R1", "C1", "O1"])
+def test_rooms_corridors_and_open_spaces_take_scores(region_id: str) -> None:
+    opinions = Opinions()
+    opinions.add_scores({region_id: 0.9})
+    assert opinions.speaks_of_rooms
+
+
 def test_a_view_says_something_about_what_is_near_it_and_an_id_says_more() -> None:
     opinions = Opinions()
     opinions.add_view(Point(0.0, 0.0), 1.0)

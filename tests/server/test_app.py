@@ -69,7 +69,7 @@ async def test_turning_and_looking_around_are_there_by_default(tmp_path: Path) -
         names = {tool.name for tool in (await client.list_tools()).tools}
         first, *_ = (client.instructions or "").splitlines()
     assert names >= {"turn", "look_around", "stop_robot", "what_is_blocked"}
-    told = [first.index(word) for word in ("map", "camera", "rooms", "drives", "memory of places")]
+    told = [first.index(word) for word in ("map", "camera", "rooms", "drives")]
     assert told == sorted(told)
 
 
@@ -166,3 +166,14 @@ async def test_schemas_are_flat_and_say_null_as_an_alternative(tmp_path: Path) -
     assert "$ref" not in told
     assert "$defs" not in told
     assert '"type": [' not in told
+
+
+async def test_without_a_tool_that_writes_memory_neither_prompts_nor_instructions_speak_of_it(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("drive", "places")) as client:
+        prompts = (await client.list_prompts()).prompts
+        instructions = client.instructions or ""
+    assert not prompts
+    assert "write_semantic_data" not in instructions
+    assert "memory" not in instructions

@@ -295,9 +295,9 @@ async def test_a_picture_in_which_the_thing_was_written_down_does_not_count_as_w
     assert of_bench["n_earlier"] == 0
     assert "2 earlier pictures count as looked at, and had none" in of_sofa["reason"]
     assert "had none" not in of_bench["reason"]
-    # The detector looks on the way, too: nothing is left to look at anew.
-    assert (of_sofa["state"], of_sofa["n_looks"], of_sofa["n_earlier"]) == ("not_found", 0, 0)
-    assert of_sofa["seen_percent"] > 95
+    # The detector looks on the way, too; what is all but reached is looked at all the same.
+    assert (of_sofa["state"], of_sofa["n_looks"], of_sofa["n_earlier"]) == ("look", 1, 2)
+    assert of_sofa["seen_percent"] > 80
 
 
 async def test_pictures_that_nobody_read_for_the_thing_do_not_count(tmp_path: Path) -> None:
@@ -355,8 +355,8 @@ async def test_a_search_begins_where_the_detector_has_reported_the_thing(tmp_pat
         await client.call_tool("look_through_camera", {})
         robot.pose = Pose(1.5, 1.4, 0.0)
         answer = report_of(await client.call_tool("search_for", {"thing": "sofa"}))
-    assert "the detector reported it in P2" in answer["reason"]
-    assert answer["looks_at"].startswith("P2: the detector reported it in this picture, ")
+    assert "reported it in 1 earlier picture: look again from P2" in answer["reason"]
+    assert answer["looks_at"].startswith("P2: the detector reported it in this picture, taken ")
     assert answer["state"] == "reported"
     assert robot.pose.x > 5.0
 

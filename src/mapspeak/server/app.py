@@ -367,7 +367,8 @@ def build_server(
         book.put_up(server.skills)
     if expose:
         server.expose(ros, tuple(expose))
-    add_prompts(server)
+    if "write_semantic_data" in {tool.name for tool in chosen}:
+        add_prompts(server)
     return server
 
 

@@ -78,12 +78,14 @@ class Earlier:
 
     Attributes:
         looks: Those that count as looked at, and did not show it.
-        reporting: Those in which the robot's detector reported it, the latest first.
+        reporting: Those in which the robot's detector reported it, the latest first, one a place.
+        n_reporting: How many there are in all.
         n_unread: How many say nothing, because no model has described them.
     """
 
     looks: tuple[Look, ...] = ()
     reporting: tuple[TakenPicture, ...] = ()
+    n_reporting: int = 0
     n_unread: int = 0
 
 
@@ -110,6 +112,7 @@ def read_earlier(
     return Earlier(
         looks=tuple(looks),
         reporting=_apart(found[::-1]),
+        n_reporting=len(found),
         n_unread=sum((each.pose, each.horizontal_fov_rad) not in looks for each in unread),
     )
 
@@ -171,8 +174,8 @@ class Opinions:
 
     @property
     def speaks_of_rooms(self) -> bool:
-        """True when a room or corridor has a score."""
-        return any(key.startswith(("R", "C")) for key in self._by_id)
+        """True when a room, corridor or open space has a score."""
+        return any(key.startswith(("R", "C", "O")) for key in self._by_id)
 
     def add_scores(self, scores: Mapping[str, float]) -> None:
         """Take in scores of places by their ids; newer ones replace older ones."""

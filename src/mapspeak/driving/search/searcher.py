@@ -192,19 +192,13 @@ class Searcher:
                 return SearchState.NOT_FOUND
             case TripState.INTERRUPTED:
                 return SearchState.INTERRUPTED
-            case TripState.ARRIVED:
-                return self._arrive()
+            case TripState.ARRIVED if (here := self._here) is not None and here.name:
+                self._visited.add(here.name)
         self._label = await self._find_report()
         if self._label is None:
-            return None
+            return SearchState.LOOK if state is TripState.ARRIVED else None
         await self._trips.give_up()
         return SearchState.REPORTED
-
-    def _arrive(self) -> SearchState:
-        here = self._here
-        if here is not None and here.name:
-            self._visited.add(here.name)
-        return SearchState.LOOK
 
     async def _set_out(self, world: WorldModel, ticket: int) -> TripState | None:
         """Set out to the next place where there is no trip, or it has become pointless."""

@@ -31,10 +31,10 @@ NEXT_STEP = {
     ExplorationState.DRIVING: "Call {explore} again to go on. {stop_robot} ends it.",
     ExplorationState.AT_GOAL: "Look at the picture, record what matters, call {explore} to go on.",
     ExplorationState.BOUND_REACHED: "Call {explore} again to go on as far again.",
-    ExplorationState.NOTHING_LEFT: "The map is complete. Call {look_at_map}.",
+    ExplorationState.NOTHING_LEFT: "Call {look_at_map}.",
     ExplorationState.REST_UNREACHABLE: (
-        "All that can be reached is known. Open what is in the way, or wait until it is no longer "
-        "closed, then call {explore} again."
+        "All that can be reached is known. Where cannot_reach says closed, open it or wait, then "
+        "call {explore} again."
     ),
     ExplorationState.NOTHING_KNOWN: "Start SLAM, or wait until the first map has floor on it.",
     ExplorationState.INTERRUPTED: (

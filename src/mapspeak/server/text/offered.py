@@ -115,8 +115,8 @@ def _fault(location: tuple[int | str, ...], message: str) -> str:
 
 
 WHAT = (
-    "mapspeak gives you a mobile robot: its map, its camera, its rooms and doors, drives to any "
-    "place, and a memory of places."
+    "mapspeak gives you a mobile robot: its map, its camera, its rooms and doors, and drives to "
+    "any place."
 )
 READS_ONLY = "Nothing here moves or changes the robot."
 OBSERVED = (

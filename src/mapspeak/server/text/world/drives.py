@@ -22,7 +22,7 @@ from mapspeak.errors import LinkError
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import say_point
+from mapspeak.server.text.wording import say_count, say_point
 from mapspeak.server.text.world.maps import say_merits, say_refusal
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
 from mapspeak.worldmodel.model import WorldModel
@@ -207,7 +207,9 @@ def _say_progress(progress: Progress) -> str:
         case ExplorationState.BOUND_REACHED:
             return f"{_say_reached(progress)}{_say_left(progress)}"
         case ExplorationState.NOTHING_LEFT:
-            return f"Nothing is left to explore{_say_not_worth(progress.not_worth)}."
+            walls = progress.pictured_ratio
+            shown = "" if walls is None else f" Pictures show {walls:.1%} of the walls."
+            return f"Nothing is left to explore{_say_not_worth(progress.not_worth)}.{shown}"
         case ExplorationState.REST_UNREACHABLE:
             return _say_rest(progress)
         case ExplorationState.INTERRUPTED if said := say_trip_end(progress.trip_end):
@@ -258,8 +260,8 @@ def _say_not_worth(borders: tuple[RefusedFrontier, ...]) -> str:
     if not borders:
         return ": all was seen"
     left_m = sum(each.length_m for each in borders)
-    places = "places" if len(borders) > 1 else "place"
-    return f" that is worth a drive; {left_m:.1f} m of border in {len(borders)} {places} stay"
+    where = f"{say_count(len(borders), 'place')} {'stay' if len(borders) > 1 else 'stays'}"
+    return f" that is worth a drive; {left_m:.1f} m of border in {where}"
 
 
 def _say_rest(progress: Progress) -> str:
@@ -281,7 +283,8 @@ def say_target(target: Target) -> str:
     """Say where the robot goes next, and why there."""
     if target.earlier is not None:
         return f"{target.id}: another try; before: {say_trip_end(target.earlier.end)}"
-    return f"{target.id}: {say_merits(target.frontier) if target.frontier else ''}"
+    merits = say_merits(target.frontier) if target.frontier else "walls that no picture shows"
+    return f"{target.id}: {merits}"
 
 
 def say_blocked(place: BlockedPlace) -> str:
@@ -325,7 +328,8 @@ def say_standing(standing: SearchProgress) -> str:
 def _say_state(standing: SearchProgress) -> str:
     match standing.state:
         case SearchState.REPORTED:
-            return f"The robot's detector reports {standing.label}."
+            like = "" if standing.label == standing.thing else f", a name like {standing.thing}"
+            return f"The robot's detector reports {standing.label}{like}."
         case SearchState.FOUND:
             return f"{standing.thing} was found."
         case SearchState.INTERRUPTED if said := say_trip_end(standing.trip_end):
@@ -344,11 +348,13 @@ def _say_spent(standing: SearchProgress) -> str:
 def _say_earlier(earlier: Earlier) -> str:
     """Say what earlier pictures count for; nothing where there were none."""
     told = []
-    if earlier.looks:
-        told.append(f"{len(earlier.looks)} earlier pictures count as looked at, and had none")
     if earlier.reporting:
         ids = ", ".join(each.id for each in earlier.reporting)
-        told.append(f"the detector reported it in {ids}")
+        pictures = say_count(earlier.n_reporting, "earlier picture")
+        told.append(f"the detector reported it in {pictures}: look again from {ids}")
+    if earlier.looks:
+        others = "others" if told else "earlier pictures"
+        told.append(f"{len(earlier.looks)} {others} count as looked at, and had none")
     if earlier.n_unread:
         told.append(f"{earlier.n_unread} earlier pictures do not count: nobody looked for it then")
     said = "; ".join(told)
@@ -367,7 +373,7 @@ def _say_why(candidate: SearchCandidate) -> str:
         what = "thing that is remembered" if is_thing else "remembered place"
         return f"a {what} speaks of it, {away}"
     if candidate.kind is CandidateKind.PICTURED:
-        return f"the detector reported it in this picture, {away}"
+        return f"the detector reported it in this picture, taken {away}"
     what = "unknown or unseen floor" if candidate.frontier else "floor not looked at yet"
     liking = "" if candidate.score == 0.5 else f", score {candidate.score:.2f}"
     return f"{candidate.area_m2:.1f} m2 of {what}, {away}{liking}"
