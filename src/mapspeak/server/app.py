@@ -367,8 +367,7 @@ def build_server(
         book.put_up(server.skills)
     if expose:
         server.expose(ros, tuple(expose))
-    if "write_semantic_data" in {tool.name for tool in chosen}:
-        add_prompts(server)
+    add_prompts(server, {tool.name for tool in chosen})
     return server
 
 

@@ -5,7 +5,7 @@ filtering policy without quoting it; the three categories are in the paper's wor
 left out is said by `mapspeak.memory`, which holds every record to it.
 """
 
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from importlib import resources
 from typing import Any
@@ -171,8 +171,10 @@ def policy_text() -> str:
     return "\n".join([read_text("semantic_policy"), *(f"- {line}" for line in LEFT_OUT.values())])
 
 
-def add_prompts(server: MCPServer) -> None:
-    """Register the paper's exploration prompt and its semantic filtering policy."""
+def add_prompts(server: MCPServer, offered: Collection[str]) -> None:
+    """Register the paper's exploration prompt and policy where the tool that they name is there."""
+    if "write_semantic_data" not in offered:
+        return
 
     @server.prompt(title="Explore and map (the paper's exploration prompt)")
     def exploration() -> str:
