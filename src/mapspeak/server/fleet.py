@@ -57,7 +57,7 @@ class FleetServer(MCPServer[Any]):
         self._subscribers = ToolListSubscribers(self)
         for server in servers.values():
             server.subscribers.pass_on(self._subscribers.tell)
-        add_prompts(self)
+        add_prompts(self, fullest.skills.taken_names)
 
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
