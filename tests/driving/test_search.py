@@ -284,32 +284,6 @@ async def test_what_the_detector_reports_wrongly_is_not_shown_for_ever(
     assert n_reports < 5
 
 
-@pytest.mark.parametrize("wait_s", [0.6, 1.0, 1.5])
-async def test_a_place_that_the_robot_has_all_but_reached_is_looked_at(
-    tmp_path: Path, flat: World, wait_s: float
-) -> None:
-    """The detector may miss what the robot drives towards."""
-    robot = RoamingRobot(flat, has_detector=True)
-    searcher = Searcher(session_of(robot, tmp_path))
-    before: SearchProgress | None = None
-    given_up = []
-    while before is None or not before.state.is_end:
-        judgement = NOT_SEEN if before is not None and before.state.shows_picture else Judgement()
-        standing = await searcher.advance(
-            "forklift", judgement, NO_BUDGET, wait_s=wait_s, on_trip=_tell_nobody
-        )
-        if before is not None and before.state is SearchState.DRIVING and before.here is not None:
-            here = before.here.pose
-            was_near = before.pose.point.distance_to(here.point) < 0.8
-            goes_on = standing.here is not None and standing.here.pose == here
-            if was_near and not goes_on:
-                given_up.append(here)
-        if standing.state.shows_picture:
-            searcher.note_picture(await robot.fetch_picture())
-        before = standing
-    assert not given_up
-
-
 async def test_a_stop_ends_the_search(tmp_path: Path, flat: World) -> None:
     robot = RoamingRobot(flat)
     session = session_of(robot, tmp_path)

@@ -41,8 +41,6 @@ LEFT_RATIO = 0.3
 """Less than this of what a place had to show is left: it was seen on the way."""
 BETTER_RATIO = 1.5
 """When the model changes its mind, the robot turns only for a target this much better."""
-NEARLY_THERE_M = 2.0
-"""A place this near is driven to though the detector has looked at its floor from the way."""
 HERE_M = 0.15
 HERE_RAD = math.radians(8)
 SAME_M = 1.0
@@ -203,7 +201,12 @@ class Searcher:
     async def _set_out(self, world: WorldModel, ticket: int) -> TripState | None:
         """Set out to the next place where there is no trip, or it has become pointless."""
         trip, here = self._trips.current, self._here
-        if trip is not None and here is not None and await self._goes_on(world, here):
+        if (
+            trip is not None
+            and here is not None
+            and not self._has_new_opinion
+            and not await self._is_pointless(world, here)
+        ):
             return TripState.UNDER_WAY
         candidates = await self._site.compute(lambda: self._find_candidates(world))
         if not candidates and self._seen.n_earlier:
@@ -254,17 +257,10 @@ class Searcher:
             if (score := find_context_score(words, self._thing)) is not None:
                 self._opinions.add_context(waypoint.pose.point, score)
 
-    async def _goes_on(self, world: WorldModel, here: SearchCandidate) -> bool:
-        """Return True if the robot is to drive on to a place, whatever else there is."""
+    async def _is_pointless(self, world: WorldModel, here: SearchCandidate) -> bool:
+        """Return True if the place was seen on the way, or the robot cannot stand there."""
         if not has_room_at(world.grid, here.pose.point, radius_m=world.radius_m):
-            return False
-        # A detector misses what no picture was judged for.
-        if world.robot.point.distance_to(here.pose.point) <= NEARLY_THERE_M:
             return True
-        return not self._has_new_opinion and not await self._is_seen(world, here)
-
-    async def _is_seen(self, world: WorldModel, here: SearchCandidate) -> bool:
-        """Return True if most of what a place has to show was seen on the way."""
         if here.name:
             return False
         left_m2 = await self._site.compute(
