@@ -97,3 +97,7 @@ class SkillError(MapspeakError):
 
 class SemanticMapError(MapspeakError):
     """The semantic map file, or a record meant for it, is wrong."""
+
+
+class DamagedMapError(SemanticMapError):
+    """A map that a memory has kept cannot be understood; it is there, and reading goes on."""

@@ -11,7 +11,7 @@ import numpy as np
 from filelock import FileLock
 
 from mapspeak.atomic import sync_folder
-from mapspeak.errors import MapError, SemanticMapError
+from mapspeak.errors import DamagedMapError, MapError, SemanticMapError
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.mapwriting import write_map
@@ -61,7 +61,7 @@ class WallFolder:
         try:
             return load_map(path).grid
         except MapError as error:
-            raise SemanticMapError(
+            raise DamagedMapError(
                 f"The map that the records belong to cannot be read: {error.message}",
                 hint=f"Put {path} back from a copy: what was remembered on it waits until then. "
                 "What is written goes on with a map of its own.",

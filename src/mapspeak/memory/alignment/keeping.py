@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapspeak.errors import SemanticMapError
+from mapspeak.errors import DamagedMapError, SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory.alignment.comparing import (
     LEAST_STILL_AGREEMENT,
@@ -116,7 +116,7 @@ class FrameKeeper:
         name = self._walls_of(frame_id)
         try:
             return name is not None and self._load(name) is not None
-        except SemanticMapError:
+        except DamagedMapError:
             return True
 
     def place(self) -> FrameId:
@@ -317,7 +317,7 @@ class FrameKeeper:
         for frame_id, name in memory.frames.walls.items():
             try:
                 kept = self._load(name)
-            except SemanticMapError as damage:
+            except DamagedMapError as damage:
                 self._damage = damage
                 continue
             if kept is not None:

@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 
-from mapspeak.errors import MapError, SemanticMapError
+from mapspeak.errors import DamagedMapError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.memory.postgres.database import Database
 from mapspeak.memory.walls import in_three_greys
@@ -48,7 +48,7 @@ class DatabaseWalls:
                 stamp_s=stamp_s,
             )
         except (zlib.error, ValueError, MapError) as error:
-            raise SemanticMapError(
+            raise DamagedMapError(
                 f"The map {name!r} that the records belong to cannot be read: {error}",
                 hint="Put its row of mapspeak.walls back from a copy: what was remembered on it "
                 "waits until then. What is written goes on with a map of its own.",
