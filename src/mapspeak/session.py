@@ -119,7 +119,8 @@ class Session:
         wall_clock = None if guard is None else guard.wall_clock
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
         self.recollector = Recollector(find_model, kept=folder)
-        self.drives, self._revising = DriveBook(self.robot, when_busy=when_busy), anyio.Lock()
+        self.drives = DriveBook(self.robot, when_busy=when_busy)
+        self._revising = anyio.Lock()
         self.keeper, self._lease = self.memory.keeper, Lease(lease_s)
         self.world: WorldModel | None = None
         self._tries, self._looked_s, self._learned = FrontierTries(), 0.0, set[str]()

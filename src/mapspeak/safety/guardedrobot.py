@@ -335,7 +335,7 @@ class GuardedRobot:
                     await self._send_on(drive)
 
     async def _end(self, drive: GuardedDrive, state: GoalState, cause: Cause) -> None:
-        """Stop the robot and remember why, whatever its navigation will say of the drive."""
+        """Stop the robot, and only then end the drive, whatever its navigation will say of it."""
         drive.verdict = drive.verdict or GoalStatus(state=state, cause=cause)
         logger.warning("The robot is stopped: %s.", cause)
         with anyio.CancelScope(shield=True):

@@ -173,16 +173,11 @@ def describe_place(world: WorldModel, place: Place) -> str:
 
 
 def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[str]:
-    at, off = find_own_point(world, place), ""
+    at, is_thing = find_own_point(world, place), isinstance(place.thing, RememberedThing)
+    off = ", where it was seen from" if is_thing else ""
     if at is not None:
         yield f"From the robot: {say_direction(world, at)}."
-    if isinstance(place.thing, RememberedThing):
-        off = (
-            "where it was seen from"
-            if at is None
-            else f"{at.distance_to(goal.pose.point):.1f} m from it"
-        )
-        off = f", {off}"
+        off = f", {at.distance_to(goal.pose.point):.1f} m from it" if is_thing else ""
     if goal.check.is_ok:
         way = lead("To go there: {navigate_to} takes {place}.", place=place.name)
         yield " ".join(filter(None, (way, say_check(goal.check))))
