@@ -109,6 +109,16 @@ async def test_check_memory_lists_the_least_trusted_first(tmp_path: Path, mode: 
     assert text.count('"sink" of "far": it is told as 9.0 m away, behind a wall') == 1
 
 
+async def test_of_things_of_little_trust_it_is_said_why(tmp_path: Path) -> None:
+    behind = {"bearing_deg": 90, "range_m": 9.0, "confidence": "unsure"}
+    far = record("far", 2.0, 1.0, "fire extinguisher", **behind)
+    async with connect(FakeRobot(two_rooms(), pose=Pose(5.0, 1.4)), tmp_path) as client:
+        await remember(client, seen("a", 4.5, 0.6), seen("b", 5.5, 2.2), far)
+        text = text_of(await client.call_tool("find_place", {"query": "fire extinguisher"}))
+    (why,) = (line for line in text.splitlines() if line.startswith("Trust in T2: "))
+    assert "behind a wall" in why
+
+
 @pytest.mark.parametrize("mode", MODES)
 async def test_pictures_and_records_are_recalled_by_time_place_and_label(
     tmp_path: Path, mode: str

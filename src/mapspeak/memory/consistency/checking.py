@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 
@@ -11,9 +11,10 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.consistency.filing import FARTHEST_M, check_rooms, file_of, find_misfiled
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
 from mapspeak.memory.consistency.unseen import UnseenThings
+from mapspeak.memory.things.approach import find_fronts
 from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.labels import name_the_same
-from mapspeak.memory.things.sight import BODY_M, OWN_M
+from mapspeak.memory.things.sight import BODY_M, OWN_M, SightMap
 from mapspeak.memory.things.thing import NOISE, Thing
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
@@ -222,7 +223,11 @@ class MemoryCheck:
         for other in np.flatnonzero(off_m <= ONE_PLACE_M).tolist():
             one, two = placed[min(other, number)], placed[max(other, number)]
             is_seen_beside = set(one.waypoints) & set(two.waypoints)
-            if not is_seen_beside and not name_the_same(two.label, one.label):
+            if (
+                not is_seen_beside
+                and not name_the_same(two.label, one.label)
+                and _share_a_side(self._unseen.found, self._rooms, one, two)
+            ):
                 yield MemoryFinding(
                     kind=FindingKind.TWO_LABELS,
                     waypoints=(*one.waypoints, *two.waypoints),
@@ -236,6 +241,34 @@ class MemoryCheck:
     @cached_property
     def _misfiled(self) -> Mapping[str, tuple[Region, Region]]:
         return find_misfiled(self._rooms, self._places.waypoints) if self._rooms else {}
+
+
+def _share_a_side(found: Things, rooms: RoomMap | None, one: Thing, two: Thing) -> bool:
+    """Return True when the floor before both is in one room, with no wall between."""
+    before_one, before_two = (
+        find_fronts(found.sight, each.position, [view.place for view in each.supporting])
+        for each in (one, two)
+        if each.position is not None
+    )
+    return any(
+        _is_open_between(found.sight, start, end) and not _are_in_two_rooms(rooms, start, end)
+        for start, end in product(before_one, before_two)
+    )
+
+
+def _is_open_between(sight: SightMap, start: Point, end: Point) -> bool:
+    grid, away_m = sight.grid, start.distance_to(end)
+    at = grid.fractional_cells_at(np.array([[start.x, start.y]]))
+    angle = np.array([start.bearing_to(end) - grid.origin.yaw_rad])
+    open_m = sight.cast(sight.wall_off, at, angle, begin_m=0.0, reach_m=away_m)
+    return open_m.item() >= away_m - grid.resolution_m
+
+
+def _are_in_two_rooms(rooms: RoomMap | None, start: Point, end: Point) -> bool:
+    if rooms is None:
+        return False
+    one, two = map(rooms.find_region_at, (start, end))
+    return one is not None and two is not None and one.id != two.id
 
 
 def _points_past(thing: Thing) -> Iterator[MemoryFinding]:

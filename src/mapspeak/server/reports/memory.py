@@ -19,7 +19,7 @@ from mapspeak.memory.quoting import quote, quote_name
 from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
 from mapspeak.places.asking import Recall, RecallQuery
-from mapspeak.places.candidate import RecallCandidate
+from mapspeak.places.candidate import DOUBTFUL_RATIO, RecallCandidate
 from mapspeak.places.goalcheck import say_check
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
@@ -223,15 +223,21 @@ class RecallAnswer(Report):
 
     @property
     def text(self) -> str:
-        """The answer in lines: what to do, a line for each candidate, what speaks for the first."""
+        """The answer in lines: what to do, a line for each candidate, why the first is trusted.
+
+        Of the others it is said why one is not.
+        """
         fitting = f"{self.n_fitting} fit{'s' * (self.n_fitting == 1)} {quote(self.understood)} best"
         heading = f"{len(self.candidates)} of {self.n_searched}, the likeliest first; {fitting}"
         lines = [self.advice]
         # What is probably not meant is named in the advice; a table of such things would mislead.
-        is_table = self.verdict is not Verdict.NOT_REMEMBERED
-        for first in self.candidates[: int(is_table)]:
+        if self.candidates and self.verdict is not Verdict.NOT_REMEMBERED:
             lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))
-            lines += [f"Trust in {first.id}: {' '.join(first.trust_why)}"] * bool(first.trust_why)
+            lines += [
+                f"Trust in {each.id}: {' '.join(each.trust_why)}"
+                for number, each in enumerate(self.candidates)
+                if each.trust_why and (not number or each.trust < DOUBTFUL_RATIO)
+            ]
         return "\n".join([*lines, *self.warnings])
 
 
