@@ -172,8 +172,8 @@ def test_what_hangs_on_two_sides_of_a_wall_is_not_in_one_place() -> None:
     one = place("a", 1.0, 2.0, mark("fire extinguisher", range_m=2.0), yaw_deg=0.0)
     other = place("b", 4.8, 2.0, mark("first-aid box", range_m=1.5), yaw_deg=180.0)
     found, findings = check(one, other)
-    extinguisher, box = (thing.position for thing in found.things)
-    assert extinguisher and box and extinguisher.distance_to(box) < 0.5
+    extinguisher, box = (thing.position or Point(math.nan, 0.0) for thing in found.things)
+    assert extinguisher.distance_to(box) < 0.5
     assert FindingKind.TWO_LABELS not in [finding.kind for finding in findings]
 
 

@@ -157,7 +157,7 @@ def test_an_event_at_no_known_place_or_in_the_past_is_refused(store: SemanticMap
 def test_an_event_can_be_ended_and_its_record_stays(store: SemanticMapStore) -> None:
     store.write_event(event(Effect.CLOSED))
 
-    end_event(store, "e1", now=NOW)
+    end_event(store, "1", now=NOW)
 
     assert say_events(store.read_events(), NOW) == ()
     assert len(store.read_events()) == 1

@@ -37,6 +37,8 @@ def _world(memory: SemanticMap | None = None) -> WorldModel:
     [
         ("R1", "R1", None),
         (" r1 ", "R1", None),
+        ("r 1", "R1", None),
+        ("R-1", "R1", None),
         ("D1", "D1", None),
         ("W1", "W1", Point(6.0, 1.5)),
         ("dock  CORNER", "dock  CORNER", Point(6.0, 1.5)),
@@ -53,6 +55,17 @@ def test_a_place_is_an_id_a_name_coordinates_or_the_robot(
     place = find_place(_world(), words)
     assert place.name == name
     assert point is None or place.point == point
+
+
+def test_a_misspelt_phrase_or_id_gets_what_was_most_likely_meant() -> None:
+    for words, says in (
+        ("smalest room", "Such words can be read: 'smallest room',"),
+        ("midle of R1", "Such words can be read: 'middle of R1',"),
+        ("R11", "R1 is spelt most like it."),
+    ):
+        with pytest.raises(GoalError) as caught:
+            find_place(_world(), words)
+        assert says in caught.value.hint
 
 
 def test_coordinates_may_come_with_a_heading() -> None:

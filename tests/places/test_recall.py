@@ -8,7 +8,7 @@ import pytest
 from embedding import ConceptEmbedder
 from fakes import two_rooms
 from mapspeak.errors import ConfigError, GoalError
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
 from mapspeak.places.asking import RecallQuery, recall
@@ -254,6 +254,24 @@ def test_what_is_like_the_words_but_not_called_so_is_named_to_be_confirmed() -> 
     world = world_of(*looks_at("wall box", EXTINGUISHER))
     with pytest.raises(GoalError, match=r"nearest in words: T1 \"wall box\".*use T1"):
         find_place(world, "box of matches")
+
+
+def test_of_things_as_like_the_words_the_nearest_is_named_first() -> None:
+    far = looks_at("fire extinguisher", EXTINGUISHER)
+    near = (
+        look("near", 1.0, 1.0, ("fire extinguisher", Point(1.5, 0.2))),
+        look("near too", 2.0, 1.0, ("fire extinguisher", Point(1.5, 0.2))),
+    )
+    memory = SemanticMap(waypoints=(*far, *near))
+    world = WorldModel(two_rooms(), Pose(6.0, 1.5), memory, radius_m=0.2)
+    recalled = recall(world, RecallQuery(words="tool to put out a fire"))
+    nearest = recalled.candidates[0].id
+    assert nearest == "T2"
+    with pytest.raises(GoalError, match=f"use {nearest}") as caught:
+        find_place(world, "tool to put out a fire")
+    assert caught.value.hint.index(nearest) < caught.value.hint.index(recalled.candidates[1].id)
+    ways = [each.check.path_m or 0.0 for each in recalled.candidates]
+    assert ways == sorted(ways)
 
 
 def test_what_speaks_against_a_thing_lowers_its_trust() -> None:

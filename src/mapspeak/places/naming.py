@@ -2,29 +2,27 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mapspeak.errors import GoalError, NextStep
+from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap, Waypoint, name_key
-from mapspeak.memory.quoting import quote_name
-from mapspeak.memory.search.answer import Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 MOST_NAMED = 12
-MOST_GUESSES = 3
 ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>[0-9]{1,9})")
 KIND_ID = re.compile(
-    r"(?:the\s+)?(?P<kind>room|corridor|hallway|open space|door|frontier|place|waypoint|thing)"
-    r"\s+(?P<id>[A-Za-z]?[0-9]{1,9})",
+    r"(?:the\s+)?"
+    r"(?P<kind>room|corridor|hallway|open space|door|frontier|place|waypoint|thing|[RCODFWT])"
+    r"[\s-]+(?P<id>[A-Za-z]?[0-9]{1,9})",
     re.IGNORECASE,
 )
-"""Room 4" is R4, and "room R4" too."""
+"""Room 4" is R4, and "room R4" and "r 4" too."""
 LETTERS = {"hallway": "C", "place": "W", "waypoint": "W"}
 """Of kinds whose ids do not begin with their own first letter."""
 IDS = re.compile(rf"{ID.pattern}(?:(?:\s*,\s*|\s+)(?:and\s+)?[A-Za-z][0-9]{{1,9}})*")
@@ -109,13 +107,6 @@ def find_named(world: WorldModel, words: str) -> Place | None:
     )
 
 
-def no_such_place(world: WorldModel, words: str) -> GoalError:
-    """Return the error for words that name no place: what became of it, and what there is."""
-    wanted = words.strip()
-    hint, step = _known_places(world, wanted)
-    return GoalError(_what_became_of(world, wanted), hint=hint, step=step)
-
-
 def find_renamed(world: WorldModel, words: str) -> dict[str, str]:
     """Return the ids in words that regions have no longer, each with what that is called now."""
     former = world.rooms.former_ids
@@ -191,23 +182,6 @@ def _read_spot(world: WorldModel, words: str) -> Place | None:
     return Place(say_spot(point), Spot(point, yaw_rad))
 
 
-def _what_became_of(world: WorldModel, place: str) -> str:
-    gone = next((each for each in world.rooms.vanished if each.id == place.upper()), None)
-    if gone is not None and gone.became:
-        return f"{gone.id} is no longer found: its floor is now {' and '.join(gone.became)}."
-    if gone is not None:
-        return f"{gone.id} is no longer found on the map."
-    match = ID.fullmatch(place)
-    letter, number = (match["letter"].upper(), int(match["number"])) if match else ("", 0)
-    if letter == "F" and 1 <= number <= world.frontiers.n_named:
-        return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
-    if letter == "T" and 1 <= number <= world.recollection.n_named:
-        return f"The thing {place.upper()} is no longer remembered."
-    if find_elsewhere(world.memory, place):
-        return f"{place[:80]!r} is remembered on another map; where that lies is not known here."
-    return f"There is no place called {place[:80]!r}."
-
-
 def find_elsewhere(memory: SemanticMap, words: str) -> tuple[Waypoint, ...]:
     """Return the places of other maps that words name, or that name a thing of the words."""
     wanted = name_key(words)
@@ -224,95 +198,3 @@ def find_elsewhere(memory: SemanticMap, words: str) -> tuple[Waypoint, ...]:
 def _contains_words(text: str, words: str) -> bool:
     # Most names are not in the text at all, and a pattern for each would take seconds to compile.
     return words in text and bool(re.search(rf"(?<!\w){re.escape(words)}(?!\w)", text))
-
-
-def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
-    if find_elsewhere(world.memory, wanted):
-        return "Let the robot see more of the building", NextStep.ALIGN
-    if ID.fullmatch(wanted):
-        return _say_ids(world, wanted[0].upper()), NextStep.SEE_PLACES
-    phrases = _say_phrases(world, wanted)
-    guesses = _guess(world, wanted) if world.places and not IDS.fullmatch(wanted) else ()
-    if guesses:
-        return f"{_say_guesses(guesses)} {phrases}", NextStep.READ_MORE
-    return phrases, NextStep.SEE_PLACES
-
-
-def _say_ids(world: WorldModel, letter: str) -> str:
-    """Say which ids of a kind there are, else all."""
-    groups = {
-        "rooms and corridors": [region.id for region in world.rooms.regions],
-        "doors": [door.id for door in world.rooms.doors],
-        "frontiers": [frontier.id for frontier in world.frontiers.frontiers],
-        "remembered": [place.id for place in world.places],
-    }
-    same = {name: ids for name, ids in groups.items() if any(each[0] == letter for each in ids)}
-    known = [f"{name} {_some_of(ids)}" for name, ids in (same or groups).items() if ids]
-    return f"Known are {'; '.join(known) or 'no places yet'}."
-
-
-def _guess(world: WorldModel, wanted: str) -> tuple[EntryCandidate, ...]:
-    """Return what may be meant; by a bare noun no thing that is only like it: a "kitchen"."""
-    answer = world.recollection.find(wanted, limit=MOST_GUESSES)
-    if answer.verdict is Verdict.NOT_REMEMBERED:
-        return ()
-    is_bare = len(ARTICLE.sub("", wanted, count=1).split()) == 1
-    return tuple(
-        each
-        for each in answer.candidates
-        if not (is_bare and each.basis is Basis.MEANING and each.entry.kind is EntryKind.THING)
-    )
-
-
-MOST_PHRASES = 3
-COUNTED = re.compile(r"\b[a-z][a-z0-9]*?(?=s?\b)")
-"""Words, a plural as its singular."""
-
-
-def _say_phrases(world: WorldModel, wanted: str) -> str:
-    """Say what words would be read here, those first that share most with the words."""
-    said = set(COUNTED.findall(wanted.casefold()))
-    near = sorted(_list_phrases(world, wanted), key=lambda each: -_count_shared(each, said))
-    return f"Such words can be read: {', '.join(map(repr, near[:MOST_PHRASES]))}."
-
-
-def _count_shared(phrase: str, said: set[str]) -> int:
-    return len(said & set(COUNTED.findall(phrase.casefold())) - {"of", "the", "to", "in"})
-
-
-def _list_phrases(world: WorldModel, wanted: str) -> Iterator[str]:
-    """Yield phrases that mean something here, of the regions that the words name."""
-    regions = world.rooms.regions
-    named = [each for each in regions if re.search(rf"\b{each.id}\b", wanted, re.IGNORECASE)]
-    kinds = {
-        "room": any(each.room_class is RoomClass.ROOM for each in regions),
-        "door": bool(world.rooms.doors),
-        "corridor": any(each.room_class is RoomClass.CORRIDOR for each in regions),
-    }
-    for region in named[:1]:
-        if world.rooms.doors_of(region):
-            yield f"all doors of {region.id}"
-        yield from (f"{where} {region.id}" for where in ("the middle of", "next to", "facing"))
-    known = [kind for kind, is_known in kinds.items() if is_known]
-    yield from (f"nearest {kind}" for kind in known)
-    yield from (f"largest {kind}" for kind in known)
-    yield from (f"all {kind}s" for kind in known)
-    yield from (f"the middle of {each.id}" for each in regions[:1])
-    yield "2 m in front of the robot"
-    yield "left of the robot"
-
-
-def _say_guesses(guesses: Sequence[EntryCandidate]) -> str:
-    """Name what may be meant, for the reader to confirm: likeness alone does not make a goal."""
-    first = guesses[0]
-    by = "meaning" if first.basis is Basis.MEANING else "words"
-    told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in guesses)
-    return (
-        f"Nothing remembered is called so; nearest in {by}: {told}. If {first.entry.id} is meant, "
-        f"use {first.entry.id}."
-    )
-
-
-def _some_of(ids: list[str]) -> str:
-    shown = " ".join(ids[:MOST_NAMED])
-    return shown if len(ids) <= MOST_NAMED else f"{shown} and {len(ids) - MOST_NAMED} more"

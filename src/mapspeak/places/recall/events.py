@@ -172,11 +172,15 @@ def _close(revision: MapRevision, area: ClosedArea) -> MapRevision:
 def end_event(store: MemoryStore, event_id: str, *, now: datetime) -> Event:
     """End an event at once; its record stays, as something that was.
 
+    Args:
+        event_id: "E3", or its number alone.
+
     Raises:
         SemanticMapError: There is none of that id, it is over already, or it cannot be written.
     """
     events = {event.id.upper(): event for event in store.read_events()}
-    event = events.get(event_id.strip().upper())
+    wanted = event_id.strip().upper()
+    event = events.get(f"E{wanted}" if wanted.isdecimal() else wanted)
     if event is None:
         known = ", ".join(each.id for each in current_events(events.values(), now)) or "none"
         raise SemanticMapError(

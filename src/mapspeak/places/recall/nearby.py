@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from mapspeak.places.candidate import last_seen
-from mapspeak.places.naming import no_such_place
+from mapspeak.places.relations.unknown import no_such_place
 from mapspeak.places.things import THING_ID, find_things
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedThing

@@ -10,8 +10,9 @@ from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
 from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.places.goalcheck import GoalCheck, check_goal, say_instead, say_refusal
-from mapspeak.places.naming import Place, Spot, find_named, is_taken_name, no_such_place, say_spot
+from mapspeak.places.naming import Place, Spot, find_named, is_taken_name, say_spot
 from mapspeak.places.relations.relating import find_related, find_several_related
+from mapspeak.places.relations.unknown import no_such_place
 from mapspeak.places.standing import arrival_pose
 from mapspeak.places.things import IN_ROOM, find_thing, find_things, place_of
 from mapspeak.places.ways import stand_at

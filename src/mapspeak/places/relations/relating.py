@@ -7,7 +7,7 @@ import numpy as np
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.places.naming import Place, find_named, no_such_place
+from mapspeak.places.naming import Place, find_named
 from mapspeak.places.relations.directions import stand_towards
 from mapspeak.places.relations.grammar import (
     Away,
@@ -62,6 +62,7 @@ from mapspeak.places.relations.superlatives import (
     find_superlative,
     require_one,
 )
+from mapspeak.places.relations.unknown import no_such_place
 from mapspeak.places.relations.vocabulary import pattern, plain
 from mapspeak.places.standing import find_standing_point, reach_doors
 from mapspeak.places.ways import standing_point
