@@ -144,21 +144,36 @@ def _say_template(template: str, details: Collection[str | None]) -> str:
 
 
 def _table(toolsets: dict[str, list[Tool]]) -> str:
+    homes = _find_homes(toolsets)
     lines = ["| tool | what it does | toolset |", "|---|---|---|"]
     lines += [
-        f"| `{tool.name}` | {_first_sentence(tool)} | {name} |"
+        f"| `{tool.name}` | {_first_sentence(tool)} | {', '.join(homes[tool.name])} |"
         for name, tools in toolsets.items()
         for tool in tools
+        if homes[tool.name][0] == name
     ]
     return "\n".join(lines) + "\n"
 
 
 def _reference(toolsets: dict[str, list[Tool]]) -> str:
+    homes = _find_homes(toolsets)
     parts = ["# Tools\n\nGenerated from the code by `./run docs`."]
     for name, tools in toolsets.items():
         parts.append(f"## Toolset `{name}`")
-        parts += [_section(tool) for tool in tools]
+        elsewhere = [f"`{tool.name}`" for tool in tools if homes[tool.name][0] != name]
+        if elsewhere:
+            parts.append(f"Described above: {', '.join(elsewhere)}.")
+        parts += [_section(tool) for tool in tools if homes[tool.name][0] == name]
     return "\n\n".join(parts) + "\n"
+
+
+def _find_homes(toolsets: dict[str, list[Tool]]) -> dict[str, list[str]]:
+    """Return the toolsets of each tool; the first is where it is described."""
+    homes: dict[str, list[str]] = {}
+    for name, tools in toolsets.items():
+        for tool in tools:
+            homes.setdefault(tool.name, []).append(name)
+    return homes
 
 
 def _section(tool: Tool) -> str:

@@ -31,6 +31,34 @@ async def test_the_papers_tools_are_there_by_default(tmp_path: Path, mode: str) 
     assert "robot" in instructions
 
 
+async def test_the_papers_prompts_run_by_its_own_toolset(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("paper",)) as client:
+        names = {tool.name for tool in (await client.list_tools()).tools}
+    drives = {"navigate_to", "wait_for_goal", "look_through_camera", "stop_robot"}
+    assert names == PAPER_TOOLS | drives
+
+
+async def test_the_memorys_toolset_can_write_it(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("memory",)) as client:
+        names = {tool.name for tool in (await client.list_tools()).tools}
+    assert names >= {"write_semantic_data", "get_semantic_data", "find_place", "recall_episodes"}
+
+
+async def test_a_tool_that_is_not_offered_tells_which_toolset_has_it(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("look",)) as client:
+        explore = await client.call_tool("explore", {})
+        stranger = await client.call_tool("fly", {})
+    assert explore.is_error
+    assert "--toolsets +explore" in text_of(explore)
+    assert stranger.is_error
+    assert "toolset" not in text_of(stranger)
+
+
+async def test_a_server_that_moves_nothing_promises_no_drives(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, is_read_only=True) as client:
+        assert "drives" not in (client.instructions or "")
+
+
 async def test_every_argument_is_described_and_no_title_is_sent(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         tools = (await client.list_tools()).tools

@@ -27,7 +27,12 @@ from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.remarks import Remarks, shorten_report, show_controls_of
 from mapspeak.server.reports.representations import Representation
-from mapspeak.server.text.offered import explain, offering, write_instructions
+from mapspeak.server.text.offered import (
+    explain,
+    offering,
+    say_not_offered,
+    write_instructions,
+)
 from mapspeak.server.text.wording import show_controls
 from mapspeak.server.tools.caller import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess
@@ -77,6 +82,7 @@ class MapspeakServer(MCPServer[Any]):
         book: SkillBook,
         *,
         instructions: str,
+        known: Mapping[str, Sequence[Tool]],
         call_log: CallNoting | None = None,
     ) -> None:
         super().__init__(
@@ -90,7 +96,7 @@ class MapspeakServer(MCPServer[Any]):
         self.add_tool(ChatView(session).view_map, name=VIEW_MAP, structured_output=False)
         self.book = book
         self._session = session
-        self._call_log = call_log
+        self._call_log, self._known = call_log, known
         self._offered: dict[str, Tool] = {}
         self._remarks = Remarks(session)
         self.skills = SkillBoard(runs, others=lambda: self._offered)
@@ -202,10 +208,18 @@ class MapspeakServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         if name in self.skills.skills:
             return await self.skills.call(name, arguments, context)
+        if name not in self._offered and (toolsets := self._find_toolsets(name)):
+            raise ToolError(say_not_offered(name, toolsets))
         try:
             return await super().call_tool(name, arguments, context)
         finally:
             await self.tell_changes()
+
+    def _find_toolsets(self, name: str) -> list[str]:
+        """Return the toolsets that have a tool, offered or not."""
+        return [
+            toolset for toolset, tools in self._known.items() if any(t.name == name for t in tools)
+        ]
 
     def offer(self, tool: Tool) -> None:
         """Add a tool to those that can be called."""
@@ -359,7 +373,9 @@ def build_server(
     with offering({tool.name for tool in chosen}):
         moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
         instructions = write_instructions(moves=moves)
-        server = MapspeakServer(session, runs, book, instructions=instructions, call_log=call_log)
+        server = MapspeakServer(
+            session, runs, book, instructions=instructions, known=known, call_log=call_log
+        )
         server.skills.is_read_only = is_read_only
         for tool in chosen:
             server.offer(tool)

@@ -38,6 +38,10 @@ from mapspeak.session import Session
 from mapspeak.skills.runs import SkillRuns
 
 STOP = "stop_robot"
+IN_PAPERS_PROMPTS = ("navigate_to", "wait_for_goal", "look_through_camera")
+"""What the paper's prompts ask for besides its own tools: they run by the toolset alone."""
+SEMANTIC_DATA = ("write_semantic_data", "get_semantic_data")
+"""Those of the paper's tools without which there is no memory."""
 
 
 def build_toolsets(
@@ -57,16 +61,24 @@ def build_toolsets(
         book: Its skills.
     """
     find, ros, runs = FindTools(session), ros or RosAccess(session), runs or SkillRuns()
+    look = tools_of(LookTools(session, representation))
+    drive, paper = tools_of(DriveTools(session), ViewTools(session)), PaperTools(session)
     book = book or SkillBook(session, ros)
     run_tools = SkillRunTools(runs)
     return {
-        "look": tools_of(LookTools(session, representation)),
+        "look": look,
         "places": tools_of(find, PlaceTools(session)),
-        "drive": tools_of(DriveTools(session), ViewTools(session)),
+        "drive": drive,
         "explore": tools_of(ExploreTools(session)),
         "routes": tools_of(RouteTools(session)),
-        "paper": tools_of(PaperTools(session)),
-        "memory": tools_of(find, MemoryTools(session)),
+        "paper": [
+            *(tool for tool in (*look, *drive) if tool.name in IN_PAPERS_PROMPTS),
+            *tools_of(paper),
+        ],
+        "memory": [
+            *(tool for tool in tools_of(paper) if tool.name in SEMANTIC_DATA),
+            *tools_of(find, MemoryTools(session)),
+        ],
         "ros": tools_of(
             TopicTools(ros),
             MeasuringTools(ros),
@@ -108,8 +120,8 @@ def choose_tools(
         return choose_tools(
             known, toolsets=chosen_sets, tools={*chosen_tools, STOP}, is_read_only=is_read_only
         )
-    # find_place and skill_status stand in two toolsets.
-    return list({tool.name: tool for tool in reversed(chosen)}.values())[::-1]
+    # Some stand in two toolsets.
+    return list({tool.name: tool for tool in chosen}.values())
 
 
 def _check_names(what: str, asked: set[str], known: set[str]) -> None:

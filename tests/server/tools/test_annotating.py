@@ -86,6 +86,23 @@ async def test_an_image_column_is_a_bearing_from_where_the_picture_was_taken(
     assert answer["seen_from"] == "x 1.50, y 1.40, yaw 0 deg, in R2"
 
 
+async def test_a_direction_without_a_picture_is_from_where_the_robot_stands(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await look(client)
+        robot.pose = Pose(5.0, 1.4, 0.0)
+        await write(
+            client,
+            {"label": "desk", "bearing_deg": 0, "range_m": 0.5},
+            {"label": "sink", "bearing_deg": 0, "range_m": 1.0, "picture": "P1"},
+        )
+    place = stored(tmp_path)
+    desk, sink = place.functional_landmarks
+    assert place.pose == robot.pose
+    assert (degrees(desk.bearing_rad), desk.pose) == (pytest.approx(0.0), None)
+    assert sink.pose == START
+
+
 async def test_a_place_knows_its_room_and_the_picture_that_was_taken_there(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path) as client:

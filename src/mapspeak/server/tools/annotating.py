@@ -65,7 +65,7 @@ class LandmarkInput(BaseModel):
     range_m: float | None = Field(default=None, ge=0, allow_inf_nan=False)
     confidence: Confidence | None = None
     note: str | None = Field(default=None, max_length=300)
-    picture: str | None = Field(default=None, description="e.g. P3; else the last", max_length=80)
+    picture: str | None = Field(default=None, description="e.g. P3; else from here", max_length=80)
 
 
 class Landmarks(RootModel[list[Label | LandmarkInput]]):
@@ -89,9 +89,11 @@ class Annotator:
     refused: list[str] = field(default_factory=list)
 
     def find_origin(self, *given: Landmarks | None) -> TakenPicture | None:
-        """Return the last picture that the landmarks were seen in, if they say so."""
-        spoken_of = [self._find_picture(thing) for thing in _things(given)]
-        taken = [picture for picture in spoken_of if picture is not None]
+        """Return the last picture that the landmarks were seen in; None if one was seen from here."""
+        seen = [(thing, self._find_picture(thing)) for thing in _things(given)]
+        if any(thing.bearing_deg is not None and picture is None for thing, picture in seen):
+            return None
+        taken = [picture for _, picture in seen if picture is not None]
         return max(taken, key=lambda picture: picture.stamp_s, default=None)
 
     def find_picture_from(self, pose: Pose) -> TakenPicture | None:
