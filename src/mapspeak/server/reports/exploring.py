@@ -30,7 +30,8 @@ WHOLE_RATIO = 0.9
 NEXT_STEP = {
     ExplorationState.DRIVING: "Call {explore} again to go on. {stop_robot} ends it.",
     ExplorationState.AT_GOAL: (
-        "Look at the picture. Record what matters with {write_semantic_data}. Call {explore} to go on."
+        "Look at the picture. Record what matters with {write_semantic_data}. Call {explore} to go "
+        "on."
     ),
     ExplorationState.BOUND_REACHED: "Call {explore} again to go on as far again.",
     ExplorationState.NOTHING_LEFT: "Call {look_at_map}.",
@@ -52,7 +53,8 @@ DETOUR_M = 0.05
 ROUTE_NEXT_STEP = {
     RouteState.DRIVING: "Call {follow_route} without stops to go on. {stop_robot} ends it.",
     RouteState.AT_STOP: (
-        "Look. Record what matters with {write_semantic_data}. Then call {follow_route} without stops."
+        "Look. Record what matters with {write_semantic_data}. Then call {follow_route} without "
+        "stops."
     ),
     RouteState.PLANNED: (
         "Nothing was driven and no route was changed. Call {follow_route} with these stops, "

@@ -89,7 +89,7 @@ class Annotator:
     refused: list[str] = field(default_factory=list)
 
     def find_origin(self, *given: Landmarks | None) -> TakenPicture | None:
-        """Return the last picture that the landmarks were seen in; None if one was seen from here."""
+        """Return the last picture that they were seen in; None where one was seen from here."""
         seen = [(thing, self._find_picture(thing)) for thing in _things(given)]
         if any(thing.bearing_deg is not None and picture is None for thing, picture in seen):
             return None
