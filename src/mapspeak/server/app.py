@@ -65,6 +65,7 @@ class MapspeakServer(MCPServer[Any]):
     """An MCP server with one entry for every call: it notes the client and makes errors readable.
 
     Args:
+        known: All toolsets, offered or not.
         instructions: The text that a model reads before its first call.
         call_log: Where every call is noted; None for nowhere.
 
@@ -80,9 +81,9 @@ class MapspeakServer(MCPServer[Any]):
         session: Session,
         runs: SkillRuns,
         book: SkillBook,
+        known: Mapping[str, Sequence[Tool]],
         *,
         instructions: str,
-        known: Mapping[str, Sequence[Tool]],
         call_log: CallNoting | None = None,
     ) -> None:
         super().__init__(
@@ -372,10 +373,8 @@ def build_server(
     chosen = choose_tools(known, toolsets=sets, tools=tools, is_read_only=is_read_only)
     with offering({tool.name for tool in chosen}):
         moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
-        instructions = write_instructions(moves=moves)
-        server = MapspeakServer(
-            session, runs, book, instructions=instructions, known=known, call_log=call_log
-        )
+        told = write_instructions(moves=moves)
+        server = MapspeakServer(session, runs, book, known, instructions=told, call_log=call_log)
         server.skills.is_read_only = is_read_only
         for tool in chosen:
             server.offer(tool)

@@ -5,7 +5,7 @@ filtering policy without quoting it; the three categories are in the paper's wor
 left out is said by `mapspeak.memory`, which holds every record to it.
 """
 
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import resources
 from typing import Any
@@ -62,7 +62,7 @@ def build_toolsets(
     """
     find, ros, runs = FindTools(session), ros or RosAccess(session), runs or SkillRuns()
     look = tools_of(LookTools(session, representation))
-    drive, paper = tools_of(DriveTools(session), ViewTools(session)), PaperTools(session)
+    drive, paper = tools_of(DriveTools(session), ViewTools(session)), tools_of(PaperTools(session))
     book = book or SkillBook(session, ros)
     run_tools = SkillRunTools(runs)
     return {
@@ -71,14 +71,8 @@ def build_toolsets(
         "drive": drive,
         "explore": tools_of(ExploreTools(session)),
         "routes": tools_of(RouteTools(session)),
-        "paper": [
-            *(tool for tool in (*look, *drive) if tool.name in IN_PAPERS_PROMPTS),
-            *tools_of(paper),
-        ],
-        "memory": [
-            *(tool for tool in tools_of(paper) if tool.name in SEMANTIC_DATA),
-            *tools_of(find, MemoryTools(session)),
-        ],
+        "paper": [*_named(IN_PAPERS_PROMPTS, look, drive), *paper],
+        "memory": [*_named(SEMANTIC_DATA, paper), *tools_of(find, MemoryTools(session))],
         "ros": tools_of(
             TopicTools(ros),
             MeasuringTools(ros),
@@ -89,6 +83,10 @@ def build_toolsets(
         "skills": tools_of(run_tools),
         "missions": tools_of(MissionTools(book, runs), run_tools),
     }
+
+
+def _named(names: Collection[str], *groups: Sequence[Tool]) -> Iterator[Tool]:
+    return (tool for group in groups for tool in group if tool.name in names)
 
 
 def choose_tools(
