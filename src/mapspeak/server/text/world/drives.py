@@ -214,6 +214,8 @@ def _say_progress(progress: Progress) -> str:
             return _say_rest(progress)
         case ExplorationState.INTERRUPTED if said := say_trip_end(progress.trip_end):
             return said
+        case ExplorationState.AT_GOAL if progress.bounds.for_camera:
+            return "The robot stands where its picture shows much that none has shown."
     return EXPLORATION_STATES[progress.state]
 
 
