@@ -55,8 +55,8 @@ KnownPercent = Annotated[
 StopsAtGoals = Annotated[
     bool,
     Field(
-        description="pause with a camera picture where the robot arrives, and, 3 m or more from the "
-        "last pause, where it has seen from afar what it was sent to see"
+        description="pause with a camera picture where the robot arrives, and, 3 m or more from "
+        "the last pause, where it has seen from afar what it was sent to see"
     ),
 ]
 Cover = Annotated[

@@ -181,7 +181,7 @@ MOST_CLOSED = 3
 
 EXPLORATION_STATES = {
     ExplorationState.DRIVING: "There is more to explore.",
-    ExplorationState.AT_GOAL: "The robot stands at a frontier.",
+    ExplorationState.AT_GOAL: "The robot stands where something new can be seen.",
     ExplorationState.NOTHING_KNOWN: "No free floor is known yet.",
     ExplorationState.INTERRUPTED: "Something ended the drive.",
 }
@@ -214,8 +214,6 @@ def _say_progress(progress: Progress) -> str:
             return _say_rest(progress)
         case ExplorationState.INTERRUPTED if said := say_trip_end(progress.trip_end):
             return said
-        case ExplorationState.AT_GOAL if progress.bounds.for_camera:
-            return "The robot stands where its picture shows much that none has shown."
     return EXPLORATION_STATES[progress.state]
 
 
