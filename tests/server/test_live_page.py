@@ -113,6 +113,18 @@ async def test_a_drive_is_told_with_its_way(tmp_path: Path) -> None:
     assert drive["path"][0] == [pytest.approx(1.5, abs=0.3), pytest.approx(1.4, abs=0.3)]
 
 
+async def test_a_drive_to_a_thing_that_has_arrived_tells_how_far_that_is(tmp_path: Path) -> None:
+    seen = {"label": "fridge", "bearing_deg": 0, "range_m": 5.9}
+    record = {"name": "kitchenette", "description": "A room.", "functional_landmarks": [seen]}
+    async with serve_live(tmp_path, toolsets=("drive", "paper")) as live, live.hear() as events:
+        await live.client.call_tool("write_semantic_data", record)
+        await live.client.call_tool("navigate_to", {"place": "T1"})
+        drive = None
+        while not drive or drive["state"] != "arrived":
+            drive = (await next_of(events, "robot"))["drive"]
+    assert "T1 is " in drive["reason"]
+
+
 async def test_a_robot_without_a_map_yet_is_shown_by_its_pose(tmp_path: Path) -> None:
     async with serve_live(tmp_path, FakeRobot(None)) as live:
         assert (await live.wait_for("robot", "pose"))["pose"]["x"] == 1.5

@@ -1,14 +1,15 @@
 """How far a remembered thing is: its own distance, and that of the pose to look at it from."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.geometry import Point
-from mapspeak.robot import Detection
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import Detection, GoalState
 from served import connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio
@@ -109,3 +110,46 @@ async def test_of_two_alike_in_a_picture_a_label_means_neither(tmp_path: Path) -
         await note(client, "chair")
         described = text_of(await client.call_tool("describe_place", {"place": "T1"}))
     assert "was not noted" in described
+
+
+async def test_a_route_tells_from_how_far_its_things_are_seen(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=("routes", "drive", "paper")) as client:
+        await note_fridge(client)
+        stop = {"stops": ["T1", "R1"], "look": True}
+        at = report_of(await client.call_tool("follow_route", stop))
+        drive = report_of(await client.call_tool("wait_for_goal", {}))
+    off_m = math.dist((at["robot"]["x"], at["robot"]["y"]), (FRIDGE.x, FRIDGE.y))
+    assert at["state"] == "at_stop"
+    for told in (at["reason"].split("T1 is ")[1], drive["reason"].split("T1 is ")[1]):
+        assert float(told.split(" m")[0]) == pytest.approx(off_m, abs=0.4)
+    (done,) = at["done"]
+    assert float(done.split("from ")[1].split(" m")[0]) == pytest.approx(off_m, abs=0.4)
+    assert "from" not in at["next"]
+
+
+async def test_a_mission_tells_how_far_the_thing_is_that_it_drove_to(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=("drive", "missions", "paper")) as client:
+        await note_fridge(client)
+        tree = "- {drive: T1, as: there}\n- {drive: R1}"
+        ran = text_of(await client.call_tool("run_mission", {"tree": tree, "wait_s": 25}))
+    there, back = (line for line in ran.splitlines() if " drive: " in line)
+    assert float(there.split("away_m=")[1].split(",")[0]) > 0.3
+    assert "away_m" not in back
+
+
+async def test_a_look_that_does_not_show_the_thing_tells_how_far_it_is(tmp_path: Path) -> None:
+    class TurnsAway(FakeRobot):
+        async def send_goal(self, goal: Pose) -> str:
+            goal_id = await super().send_goal(goal)
+            self.end_goal(GoalState.ARRIVED, pose=replace(goal, yaw_rad=goal.yaw_rad + math.pi))
+            return goal_id
+
+    robot = TurnsAway(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await note_fridge(client)
+        told = text_of(await client.call_tool("look_at", {"place": "T1"}))
+    off_m = math.dist((robot.pose.x, robot.pose.y), (FRIDGE.x, FRIDGE.y))
+    assert "- T1" not in told
+    assert float(told.split("T1 is ")[1].split(" m")[0]) == pytest.approx(off_m, abs=0.4)

@@ -272,8 +272,19 @@ def _say(stop: RouteStop) -> str:
     """Return the words of a stop, with what they are taken for where that is something else."""
     name, words = stop.goal.name, " ".join(stop.asked.split())
     is_point = name.startswith("(")
-    return name if is_point or name.casefold() == words.casefold() else f"{words} ({name})"
+    said = name if is_point or name.casefold() == words.casefold() else f"{words} ({name})"
+    return f"{said}{_say_view(stop)}"
 
 
 def _say_in_full(stop: RouteStop) -> str:
-    return stop.goal.title if stop.goal.title.startswith(stop.asked) else _say(stop)
+    title = stop.goal.title
+    return f"{title}{_say_view(stop)}" if title.startswith(stop.asked) else _say(stop)
+
+
+def _say_view(stop: RouteStop) -> str:
+    """Say from how far a thing is seen at a stop, as it is remembered."""
+    if (thing := stop.goal.thing) is None:
+        return ""
+    at = thing.thing.position
+    where = "where it was seen" if at is None else f"{at.distance_to(stop.goal.pose.point):.1f} m"
+    return f", from {where}"

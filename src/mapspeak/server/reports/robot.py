@@ -119,7 +119,11 @@ class DriveAnswer(Report):
             pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
-            reason=say_end(report.status) or _say_thing(report),
+            reason=say_end(
+                report.status,
+                report.drive.thing,
+                report.pose.point if report.pose_doubt is None else None,
+            ),
             next_step=lead(FOREIGN_DRIVE) if foreign_goals else _say_next_step(report),
         )
 
@@ -154,13 +158,6 @@ def _say_next_step(report: DriveReport) -> str:
     return "" if thing is None else lead(at_it)
 
 
-def _say_thing(report: DriveReport) -> str:
-    """Say how far a robot that has arrived is from the thing it came for; else nothing."""
-    is_there = report.status.state is GoalState.ARRIVED and report.pose_doubt is None
-    thing = report.drive.thing
-    return "" if thing is None or not is_there else f"{say_off(report.pose.point, thing)}."
-
-
 class GoalAnswer(Report):
     """A goal judged before driving."""
 
@@ -178,8 +175,8 @@ class GoalAnswer(Report):
     @classmethod
     def of(cls, goal: CheckedGoal, *, robot: Point, room: str | None) -> Self:
         """Make the report of a goal of a robot that stands at a point."""
-        check, thing = goal.check, goal.thing
-        off = "" if thing is None else say_off(robot, thing)
+        check = goal.check
+        off = say_off(robot, goal.thing)
         return cls(
             place=goal.name,
             verdict=check.verdict,

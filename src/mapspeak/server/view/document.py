@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.robot import NavigationLook
 from mapspeak.server.text.wording import say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
@@ -209,7 +209,7 @@ class RobotLook:
     async def look(self) -> RobotView:
         """Return how the robot stands."""
         robot, guard = self._session.robot, self._session.guard
-        pose, age_s, doubt, fault = None, 0.0, "", ""
+        pose, here, age_s, doubt, fault = None, None, 0.0, "", ""
         try:
             stamped = await robot.fetch_pose()
         except MapspeakError as error:
@@ -217,13 +217,14 @@ class RobotLook:
         else:
             pose, age_s = PoseView.of(stamped.pose), round(robot.now_s - stamped.stamp_s, 1)
             doubt = say_pose_doubt(stamped.find_doubt(robot.now_s))
+            here = None if doubt else stamped.pose.point
         return RobotView(
             pose=pose,
             age_s=age_s,
             doubt=doubt,
             fault=fault,
             held_by=None if guard is None else guard.hold.read(),
-            drive=await self._describe_drive(),
+            drive=await self._describe_drive(here),
             waiting={} if guard is None else guard.approvals.fresh_room().list_waiting(),
             cameras=self._name_cameras(),
             camera_fov_deg=self._find_fov_deg(),
@@ -242,7 +243,8 @@ class RobotLook:
         fov_rad = self.camera_fov_rad or (None if latest is None else latest.horizontal_fov_rad)
         return None if fov_rad is None else round(math.degrees(fov_rad), 1)
 
-    async def _describe_drive(self) -> DriveView | None:
+    async def _describe_drive(self, robot: Point | None) -> DriveView | None:
+        """Return the latest drive; where the robot surely is tells how far it is from a thing."""
         drive, world = self._session.drives.latest, self._session.world
         if drive is None:
             return None
@@ -258,7 +260,7 @@ class RobotLook:
             id=drive.goal_id,
             place=drive.place,
             state=status.state.value,
-            reason=say_end(status),
+            reason=say_end(status, drive.thing, robot),
             goal=PoseView.of(drive.goal),
             path=path,
         )

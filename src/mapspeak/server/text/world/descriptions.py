@@ -26,7 +26,7 @@ from mapspeak.server.text.wording import (
     shorten,
 )
 from mapspeak.server.text.world.maps import say_merits, say_size
-from mapspeak.server.text.world.notices import say_direction, say_obstruction
+from mapspeak.server.text.world.notices import say_direction, say_obstruction, say_off
 from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, SIGHT_M
 from mapspeak.spatial.frontiers import Frontier
@@ -347,8 +347,11 @@ def describe_view(world: WorldModel, place: Place, picture: CameraPicture) -> st
         lines += [_say_sight(each, picture, half_view_rad) for each in sights[:MOST_SIGHTS]]
     else:
         lines.append(f"No door and no remembered thing within {SIGHT_M:.0f} m should be in it.")
-    if isinstance(place.thing, RememberedThing):
-        lines.append(lead(CHECK))
+    match place.thing:
+        case RememberedThing() as thing:
+            is_told = thing.thing.position is None or thing.id in {each.id for each in sights}
+            lines += [] if is_told else [f"{say_off(picture.pose.point, thing)}."]
+            lines.append(lead(CHECK))
     return "\n".join(filter(None, lines))
 
 

@@ -4,14 +4,7 @@ from collections import Counter
 
 from mapspeak.driving.drivereport import Drive
 from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
-from mapspeak.driving.exploration.progress import (
-    BoundKind,
-    ExplorationState,
-    Progress,
-    expected_area_m2,
-    known_area_m2,
-    known_ratio,
-)
+from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
 from mapspeak.driving.exploration.trips import Target
 from mapspeak.driving.routes.following import RouteProgress, RouteState
 from mapspeak.driving.routes.planning import RouteStop, StopState
@@ -19,13 +12,15 @@ from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate
 from mapspeak.driving.search.evidence import Earlier
 from mapspeak.driving.search.progress import BudgetKind, SearchProgress, SearchState
 from mapspeak.errors import LinkError
+from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count, say_point
 from mapspeak.server.text.world.maps import say_merits, say_refusal
+from mapspeak.server.text.world.notices import say_off
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
-from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.remembered import RememberedThing
 
 WORDS = {
     CauseCode.CANCELLED: "It was cancelled.",
@@ -127,9 +122,19 @@ def say_cause(cause: Cause | None) -> str:
     )
 
 
-def say_end(status: GoalStatus) -> str:
-    """Say why a drive ended as it did, with what became of it since; empty where nobody said."""
-    return " ".join(filter(None, (say_cause(status.cause), status.afterwards)))
+def say_end(
+    status: GoalStatus, thing: RememberedThing | None = None, robot: Point | None = None
+) -> str:
+    """Say why a drive ended as it did, and what became of it since; empty where nobody said.
+
+    Args:
+        thing: What it went to see: how far that is counts where the robot has arrived.
+        robot: Where the robot is; None where that is not sure.
+    """
+    said = " ".join(filter(None, (say_cause(status.cause), status.afterwards)))
+    if said or thing is None or robot is None or status.state is not GoalState.ARRIVED:
+        return said
+    return f"{say_off(robot, thing)}."
 
 
 def say_on_the_way(drive: Drive) -> str:
@@ -149,10 +154,11 @@ def say_route(progress: RouteProgress) -> str:
         return "The route is only planned."
     if progress.number is None:
         return _say_driving(progress)
-    stop = progress.plan.stops[progress.number]
-    number, words = progress.number + 1, stop.asked
+    stop, number = progress.plan.stops[progress.number], progress.number + 1
+    words = stop.asked
     if progress.state is RouteState.AT_STOP:
-        return f"The robot stands at stop {number}, {words}."
+        off = say_off(progress.pose.point, stop.goal.thing)
+        return f"The robot stands at stop {number}, {words}.{off and f' {off}.'}"
     if progress.ended is not None:
         return (
             say_cause(progress.ended.cause)
@@ -377,24 +383,3 @@ def _say_why(candidate: SearchCandidate) -> str:
     what = "unknown or unseen floor" if candidate.frontier else "floor not looked at yet"
     liking = "" if candidate.score == 0.5 else f", score {candidate.score:.2f}"
     return f"{candidate.area_m2:.1f} m2 of {what}, {away}{liking}"
-
-
-def say_explored(world: WorldModel) -> str:
-    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
-
-    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
-    """
-    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
-    if not world.frontiers.frontiers:
-        return f"{known_m2:.1f} m2 of free floor, {percent} %."
-    promised_m2 = expected_area_m2(world) - known_m2
-    # Not all of it, as long as there is a frontier to go to.
-    return (
-        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
-        f"{_round(promised_m2)} m2 more for now."
-    )
-
-
-def _round(area_m2: float) -> str:
-    """Return an estimate with the one or two digits that it is good for."""
-    return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"

@@ -71,8 +71,10 @@ def say_area(area: ClosedArea) -> str:
     return tell_place(name) if area.event_id else name
 
 
-def say_off(robot: Point, remembered: RememberedThing) -> str:
-    """Return how far a thing itself is from the robot, by what is remembered."""
+def say_off(robot: Point, remembered: RememberedThing | None) -> str:
+    """Return how far a thing itself is from the robot, by what is remembered; nothing of none."""
+    if remembered is None:
+        return ""
     position = remembered.thing.position
     if position is None:
         return f"nobody noted where {remembered.id} is"

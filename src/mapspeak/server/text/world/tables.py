@@ -16,7 +16,6 @@ from mapspeak.server.text.wording import (
     say_pose,
     shorten,
 )
-from mapspeak.server.text.world.drives import say_explored
 from mapspeak.server.text.world.look import (
     Layer,
     MapPart,
@@ -26,6 +25,7 @@ from mapspeak.server.text.world.look import (
 )
 from mapspeak.server.text.world.maps import (
     say_doubtful_door,
+    say_explored,
     say_merits,
     say_navigation,
     say_ranks,

@@ -1,7 +1,7 @@
 """A session as missions see it: the facts of their conditions, and the skills that all have."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from mapspeak.driving.drivereport import DriveReport
@@ -34,6 +34,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.guarding import CONDITIONS, Facts, end_within, find_unmet, is_as_wanted
 from mapspeak.skills.runs import QuestionBook
+from mapspeak.worldmodel.remembered import RememberedThing
 
 BATTERY = "sensor_msgs/BatteryState"
 HEAR_S = 3.0
@@ -269,7 +270,12 @@ class Leaves:
         with session.drives.preparing() as ticket:
             yaw_deg = given.get("yaw_deg")
             goal = await session.find_goal(place=given["place"], x=None, y=None, yaw_deg=yaw_deg)
-            return await self._drive_to(goal.pose, goal.title, ticket, on_progress)
+            outcome = await self._drive_to(goal.pose, goal.title, ticket, on_progress, goal.thing)
+        if goal.thing is None or outcome.state is not SkillState.SUCCEEDED:
+            return outcome
+        here, at = (await session.robot.fetch_pose()).pose.point, goal.thing.thing.position
+        away_m = "not noted" if at is None else round(here.distance_to(at), 1)
+        return replace(outcome, outputs={**outcome.outputs, "away_m": away_m})
 
     async def _look(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Drive to a clear view, and give the picture's id and what the detector reports in it."""
@@ -296,11 +302,16 @@ class Leaves:
         return succeeded(picture=picture_id, seen=seen)
 
     async def _drive_to(
-        self, goal: Pose, title: str, ticket: int, on_progress: OnProgress
+        self,
+        goal: Pose,
+        title: str,
+        ticket: int,
+        on_progress: OnProgress,
+        thing: RememberedThing | None = None,
     ) -> SkillOutcome:
         """Drive to a checked goal; cancelled meanwhile, the robot is left standing."""
         drives = self.session.drives
-        drive = await drives.start(goal, place=title, ticket=ticket)
+        drive = await drives.start(goal, place=title, ticket=ticket, thing=thing)
 
         async def tell(report: DriveReport) -> None:
             left_m = report.status.distance_left_m
