@@ -47,6 +47,7 @@ MOST_CALLS = 200
 COUNTED_RATIO, LATE_RATIO = 0.60, 0.95
 LEAST_IOU = 0.5
 SAME_SIZE = 1.05
+IDLE_M2 = 1.5
 FOLDER = Path(tempfile.gettempdir()) / "mapspeak-growing-rooms"
 
 
@@ -212,7 +213,8 @@ class Tally:
         n_whole: Regions told as seen whole; of them `n_false` are false.
         n_right: Looks at which the smallest room was right.
         n_unsure: At which it was said to be unsure; `n_fine` of them and of the right ones.
-        n_changed: Ids that changed class or owner.
+        n_new_class: Ids that changed class; `n_new_owner` owner; `n_come_or_gone` came or went,
+            `n_idly` of them while nearly as much floor was known as at the look before.
     """
 
     n_looks: int = 0
@@ -224,6 +226,8 @@ class Tally:
     n_late_unsure: int = 0
     n_new_class: int = 0
     n_new_owner: int = 0
+    n_come_or_gone: int = 0
+    n_idly: int = 0
     wrong: list[str] = field(default_factory=list)
 
 
@@ -242,6 +246,7 @@ def watch(name: str, tally: Tally) -> None:
     spaces = Spaces(GroundTruth(load_world(name)))
     rooms: RoomMap | None = None
     before: dict[int, tuple[RoomClass, int]] = {}
+    floor_m2 = 0.0
     for number, look in enumerate(load_looks(name)):
         rooms = find_rooms(look.grid, previous=rooms)
         shared = spaces.shared_m2(rooms)
@@ -254,7 +259,11 @@ def watch(name: str, tally: Tally) -> None:
             both = before.keys() & now.keys()
             tally.n_new_class += sum(before[each][0] != now[each][0] for each in both)
             tally.n_new_owner += sum(before[each][1] != now[each][1] for each in both)
-        before = now
+            n_come_or_gone = len(before.keys() ^ now.keys())
+            tally.n_come_or_gone += n_come_or_gone
+            is_idle = abs(shared.sum() - floor_m2) < IDLE_M2
+            tally.n_idly += n_come_or_gone * is_idle
+        before, floor_m2 = now, shared.sum()
 
 
 def _count(
@@ -334,3 +343,7 @@ def measure() -> Iterator[Figure]:
     yield Figure(name="looks from 95 % explored on", value=tally.n_late, unit="")
     yield Figure(name="ids that change class, per look", value=tally.n_new_class / n, unit="")
     yield Figure(name="ids that change owner, per look", value=tally.n_new_owner / n, unit="")
+    yield Figure(name="ids that come or go, per look", value=tally.n_come_or_gone / n, unit="")
+    yield Figure(
+        name=f"of them while less than {IDLE_M2:g} m2 of floor changed", value=tally.n_idly, unit=""
+    )

@@ -224,3 +224,27 @@ def test_a_region_that_turns_out_to_be_a_corridor_keeps_its_number() -> None:
     assert [region.id for region in after.regions] == ["C1"]
     assert after.region("R1").id == "C1"
     assert not after.vanished
+
+
+def rooms_with_opening(width_cells: int) -> Cells:
+    """Draws two rooms of 3 x 4 m with an opening between them."""
+    cells = np.zeros((84, 126), np.int8)
+    cells[:2] = cells[-2:] = 100
+    cells[:, :2] = cells[:, -2:] = cells[:, 62:64] = 100
+    low = 42 - width_cells // 2
+    cells[low : low + width_cells, 62:64] = 0
+    return cells
+
+
+def test_a_doubtful_opening_is_judged_as_before_until_the_map_really_shows_otherwise() -> None:
+    narrow, wider, gone = map(rooms_with_opening, (52, 56, 76))
+    two, one = divide(narrow), divide(wider)
+    assert (len(two.regions), len(one.regions)) == (2, 1)
+
+    kept_two, kept_one = divide(wider, previous=two), divide(narrow, previous=one)
+
+    assert [each.id for each in kept_two.regions] == [each.id for each in two.regions]
+    assert [each.id for each in kept_one.regions] == [each.id for each in one.regions]
+    assert len(divide(gone, previous=kept_two).regions) == 1
+    assert len(divide(rooms_with_opening(20), previous=kept_one).regions) == 2
+    assert kept_two.doors[0].certainty < 0.6

@@ -266,7 +266,7 @@ def find_rooms(
         MapError: The map has more cells than can be handled.
     """
     raster = build_raster(grid)
-    segmentation = segment(raster)
+    segmentation = segment(raster, previous)
     shapes, openings = measure_regions(segmentation), find_openings(segmentation)
     joined = join_corridors(segmentation, shapes, openings)
     if joined is not segmentation:

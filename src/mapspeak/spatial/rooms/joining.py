@@ -77,14 +77,21 @@ def read_trees(text: str) -> TreeSum:
     )
 
 
-def join_places(graph: PlaceGraph, judge: Judge) -> None:
-    """Join places until each is a room and each border divides."""
-    join_surest(graph, judge)
+def join_places(graph: PlaceGraph, judge: Judge, before: IntArray | None = None) -> None:
+    """Join places until each is a room and each border divides.
+
+    Args:
+        before: The region that each place was of on the map before; 0 for none.
+    """
+    join_surest(graph, judge, before)
     _absorb_small(graph, judge)
 
 
-def join_surest(graph: PlaceGraph, judge: Judge) -> None:
-    """Join places, the surest first, until every remaining border surely divides."""
+def join_surest(graph: PlaceGraph, judge: Judge, before: IntArray | None = None) -> None:
+    """Join places, the surest first, until every remaining border surely divides.
+
+    What one look divided and another joins, while nothing changes, is judged nearly alike by both.
+    """
     waiting: list[tuple[float, int, int, int]] = []
     last_judged: dict[tuple[int, int], int] = {}
 
@@ -92,6 +99,8 @@ def join_surest(graph: PlaceGraph, judge: Judge) -> None:
         if not pairs:
             return
         sure = judge(graph.measure(np.array(pairs)))
+        if before is not None:
+            sure = sure + _lean(before[np.array(pairs)])
         for pair, share in zip(pairs, sure.tolist(), strict=True):
             last_judged[pair] = number = last_judged.get(pair, 0) + 1
             if share >= SETTINGS.join_share:
@@ -108,6 +117,12 @@ def join_surest(graph: PlaceGraph, judge: Judge) -> None:
             one, other = other, one
         graph.join(one, other)
         judge_anew([(min(one, beside), max(one, beside)) for beside in graph.neighbours[one]])
+
+
+def _lean(before: IntArray) -> FloatArray:
+    """Return how much surer joins count for what the map before showed of both sides, (n, 2)."""
+    is_known, is_one = (before > 0).all(axis=1), before[:, 0] == before[:, 1]
+    return np.asarray(SETTINGS.keep_share * is_known * np.where(is_one, 1.0, -1.0))
 
 
 def _absorb_small(graph: PlaceGraph, judge: Judge) -> None:

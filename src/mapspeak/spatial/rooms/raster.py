@@ -40,6 +40,8 @@ class RoomSettings:
         stub_m: The shortest piece of wall, in line with such an opening, that is a jamb of it.
         tip_m: The thickest such piece.
         join_share: Places are joined that nothing divides with at least this certainty.
+        keep_share: So much more, or less, certain it must be that another division than that of
+            the map before is right.
         room_area_m2: Smaller regions belong to their neighbour.
         part_area_m2: The same for a region that is hardly seen yet.
         least_clearance_m: Half the width that a region must have somewhere.
@@ -64,6 +66,7 @@ class RoomSettings:
     stub_m: float = 0.5
     tip_m: float = 0.25
     join_share: float = 0.45
+    keep_share: float = 0.2
     room_area_m2: float = 1.5
     part_area_m2: float = 0.5
     least_clearance_m: float = 0.2
@@ -121,9 +124,14 @@ class Raster:
 
     def point_at(self, row: float, col: float) -> Point:
         """Return the place of a point of the raster; a cell's centre lies at +0.5, +0.5."""
-        across, along = cv2.invertAffineTransform(self.there) @ (col, row, 1.0)
-        xy: FloatArray = self.grid.points_at(np.array([along - 0.5]), np.array([across - 0.5]))
-        return Point(float(xy[0, 0]), float(xy[0, 1]))
+        ((x, y),) = self.points_at(np.array([row]), np.array([col])).tolist()
+        return Point(x, y)
+
+    def points_at(self, rows: FloatArray, cols: FloatArray) -> FloatArray:
+        """Return the places of points of the raster, in metres, shape (n, 2)."""
+        there = np.stack([cols, rows, np.ones(len(rows))])
+        across, along = cv2.invertAffineTransform(self.there) @ there
+        return self.grid.points_at(along - 0.5, across - 0.5)
 
     def on_grid(self, numbers: NDArray[np.int32]) -> NDArray[np.int16]:
         """Return the number of each cell of the grid, 0 outside of the raster."""

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.spatial.grid import IntArray
 from mapspeak.spatial.rooms.basins import (
     Basins,
     Passes,
@@ -35,6 +36,7 @@ from mapspeak.spatial.rooms.raster import (
     Truths,
     find_cells,
 )
+from mapspeak.spatial.rooms.room_map import RoomMap
 
 _APART_M = 0.4
 """Openings nearer than this to each other, one behind the other, are one doorway."""
@@ -215,15 +217,16 @@ class Segmentation:
     doubts: Mapping[tuple[int, int], float]
 
 
-def segment(raster: Raster) -> Segmentation:
-    """Divide the floor of a raster into rooms."""
+def segment(raster: Raster, previous: RoomMap | None = None) -> Segmentation:
+    """Divide the floor of a raster into rooms, rather as on the map before than otherwise."""
     floor = build_floor(raster)
     doorways = find_doorways(raster, floor)
     cut = draw_cuts(doorways, floor.floor)
     basins, passes = find_borders(raster, floor, doorways, cut)
     graph = PlaceGraph(basins, passes, raster)
     judge = load_judge()
-    join_places(graph, judge)
+    before = None if previous is None else _find_before(raster, basins, previous)
+    join_places(graph, judge, before)
     number = number_by_area(graph)
     doubts = {
         (min(pair), max(pair)): share
@@ -232,6 +235,15 @@ def segment(raster: Raster) -> Segmentation:
     }
     labels = fill_cuts(number[basins.labels], cut)
     return Segmentation(raster=raster, floor=floor, labels=labels, doubts=doubts)
+
+
+def _find_before(raster: Raster, basins: Basins, previous: RoomMap) -> IntArray:
+    """Return the region of an earlier map in which each basin's peak lies, 0 for none."""
+    rows, cols = np.divmod(basins.peaks, basins.labels.shape[1])
+    before = np.zeros(int(basins.labels.max(initial=0)) + 1, np.intp)
+    points = raster.points_at(rows + 0.5, cols + 0.5)
+    before[basins.labels[rows, cols]] = previous.grid.look_up(previous.labels, points, outside=0)
+    return before
 
 
 def find_borders(
