@@ -66,6 +66,8 @@ async def test_places_that_cannot_be_driven_to_end_it_and_are_not_tried_for_ever
     async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
         report = await explore(client, cover="camera")
     assert report["n_blocked"] >= 1
+    assert any("Nothing is left there" in each for each in report["cannot_reach"])
+    assert f"Pictures show {report['walls_pictured_percent']:.1f}% of the walls" in report["reason"]
     assert report["walls_pictured_percent"] < 95
 
 

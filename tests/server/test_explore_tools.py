@@ -72,6 +72,32 @@ async def test_exploring_goes_on_from_call_to_call_until_nothing_is_left(tmp_pat
     assert answer["driven_m"] > 1.0
 
 
+async def test_the_frontier_under_way_comes_first_and_a_wait_that_was_cut_is_told(
+    tmp_path: Path,
+) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=(5.0, 1.4)))
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        for _ in range(4):
+            answer = report_of(await client.call_tool("explore", {"wait_s": 1.0}))
+            if answer["state"] == "driving" and answer["next"].split(":")[0] in answer["frontiers"]:
+                assert answer["frontiers"][0] == answer["next"].split(":")[0]
+        asked = await client.call_tool("wait_for_goal", {"wait_s": 60})
+        within = await client.call_tool("wait_for_goal", {"wait_s": 25})
+    assert "wait_s was cut to 25" in text_of(asked)
+    assert "was cut" not in text_of(within)
+
+
+async def test_sizes_mark_what_is_not_all_seen_yet_as_the_map_does(tmp_path: Path) -> None:
+    async with connect(_robot(), tmp_path, toolsets=("look", "places")) as client:
+        await client.call_tool("look_at_map", {})
+        told = text_of(await client.call_tool("measure", {}))
+        drawn = text_of(await client.call_tool("look_at_map", {"full": True}))
+    assert set(re.findall(r"^(\w\d+) \| [\d.]+\+ ", told.split("## Sizes")[1], re.MULTILINE)) == {
+        *re.findall(r"^(\w\d+) \| [\d.]+\+ ", drawn, re.MULTILINE)
+    }
+    assert "+ | " in told
+
+
 async def test_a_picture_comes_with_every_pause_at_a_goal(tmp_path: Path) -> None:
     arguments = {"stops_at_goals": True, "n_goals": 1, "wait_s": 25.0}
     async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:

@@ -8,7 +8,7 @@ from mapspeak.skills.runs import QuestionBook
 
 def test_only_the_client_that_runs_a_mission_answers_its_questions_while_it_is_there() -> None:
     questions = QuestionBook()
-    asked = questions.put("Open?", (), picture=None, client="one")
+    asked = questions.put("Open?", (), picture=None, client="one", within_s=9.0, otherwise=None)
     with pytest.raises(SkillError, match="of yours"):
         questions.find(None, client="other")
     with pytest.raises(SkillError, match="of yours"):
@@ -20,8 +20,8 @@ def test_only_the_client_that_runs_a_mission_answers_its_questions_while_it_is_t
 
 def test_each_client_is_shown_its_own_oldest_question() -> None:
     questions = QuestionBook()
-    first = questions.put("One?", (), picture=None, client="one")
-    second = questions.put("Other?", (), picture=None, client="other")
+    first = questions.put("One?", (), picture=None, client="one", within_s=9.0, otherwise=None)
+    second = questions.put("Other?", (), picture=None, client="other", within_s=9.0, otherwise=None)
     assert questions.find(None, client="other") is second
     assert questions.find(None, client="one") is first
     with pytest.raises(SkillError, match="'Q7'"):

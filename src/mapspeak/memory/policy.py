@@ -165,6 +165,17 @@ def tells_what_to_do(text: str) -> bool:
     return any(gives_orders(part) for part in _SENTENCE_END.split(unquoted))
 
 
+PASSING = (Concern.PEOPLE, Concern.ANIMALS)
+_THERE = re.compile(r"\s*there (?:is|are) ", re.IGNORECASE)
+
+
+def find_passing(text: str) -> Concern | None:
+    """Return why a description tells of nothing that stays; None where one sentence does."""
+    parts = (_THERE.sub("", part) for part in _SENTENCE_END.split(text) if part.strip())
+    concerns = [find_concern(part) for part in parts]
+    return next((each for each in concerns if set(concerns) <= {*PASSING}), None)
+
+
 def is_purpose(text: str) -> bool:
     """Return True unless a purpose gives orders; what a thing is for may read like one."""
     use = _patterns().use.match(_plain(text))

@@ -14,7 +14,10 @@ from mapspeak.memory import SemanticMap
 from mapspeak.places.naming import REGION_ID, find_renamed
 from mapspeak.server.text.memory import say_loaded
 from mapspeak.server.text.wording import say_renamed, show_controls
+from mapspeak.server.tools.caller import LONGEST_WAIT_S, shorten_wait
 from mapspeak.session import Session
+
+CUT = f"wait_s was cut to {LONGEST_WAIT_S:g}, the most that one call waits: call again to go on."
 
 
 class Remarks:
@@ -42,8 +45,12 @@ class Remarks:
     async def tell(
         self, client: str, arguments: Mapping[str, Any], answer: CallToolResult
     ) -> CallToolResult:
-        """Prepend the new meanings of named ids, and the memory found at first contact."""
+        """Add the new meanings of named ids, the memory found at first contact, and a cut wait."""
         answer = await self._tell_found(client, answer)
+        wait_s = arguments.get("wait_s")
+        if wait_s != shorten_wait(wait_s):
+            cut = TextContent(type="text", text=CUT)
+            answer = answer.model_copy(update={"content": [*answer.content, cut]})
         renamed = await self.say_renamed(arguments)
         if not renamed:
             return answer

@@ -215,9 +215,8 @@ class MissionDesk:
             part = self._build_runner(mission, given, on_progress)
             return await self.gate.run_once(spec, part.run, command=None)
         if self.latest is not None and not self.latest.is_over:
-            under_way = self.latest.mission.spec.name
             raise SkillError(
-                f"The mission {under_way} is under way; there is one at a time.",
+                "Another mission is under way; there is one at a time.",
                 hint="Wait for its end, or cancel it.",
             )
         bounds = self.check(mission)

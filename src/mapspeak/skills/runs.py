@@ -41,6 +41,8 @@ class Question:
         id: Such as "Q1".
         client: The session that may answer it, as long as it is there; empty for anyone.
         picture: Its subject, and `picture_id`, such as "P3"; None where the mission has taken none.
+        within_s: Robot time that it waits from when it is asked.
+        otherwise: The answer where none comes; None where its step fails then.
         answer: None until one is given.
     """
 
@@ -50,6 +52,8 @@ class Question:
     client: str
     picture_id: str
     picture: CameraPicture | None
+    within_s: float
+    otherwise: str | None
     answer: str | None = None
     is_answered: anyio.Event = field(default_factory=anyio.Event)
 
@@ -74,13 +78,29 @@ class QuestionBook:
         self._pictures.clear()
 
     def put(
-        self, text: str, answers: tuple[str, ...], *, picture: str | None, client: str
+        self,
+        text: str,
+        answers: tuple[str, ...],
+        *,
+        picture: str | None,
+        client: str,
+        within_s: float,
+        otherwise: str | None,
     ) -> Question:
         """Let a question wait, about a picture or the latest."""
         self._n_asked += 1
         about = next(reversed(self._pictures), "") if picture is None else picture
         shown = self._pictures.get(about)
-        question = Question(f"Q{self._n_asked}", text, answers, client, about, shown)
+        question = Question(
+            id=f"Q{self._n_asked}",
+            text=text,
+            answers=answers,
+            client=client,
+            picture_id=about,
+            picture=shown,
+            within_s=within_s,
+            otherwise=otherwise,
+        )
         self.waiting.append(question)
         return question
 

@@ -231,6 +231,20 @@ async def test_a_question_of_a_mission_that_took_no_picture_has_none_of_an_earli
     assert [each.type for each in shown.content] == ["text"]
 
 
+async def test_a_question_says_how_long_it_waits_and_what_is_taken_then(tmp_path: Path) -> None:
+    tree = "- {ask: Open?, otherwise: shut, within_s: 40}"
+    async with missions(tmp_path) as caller:
+        asked = await caller.ask("run_mission", tree=tree)
+        shown = await caller.ask("answer_mission")
+        ended = await caller.ask("cancel_skill")
+        again = await caller.ask("run_mission", tree="- {ask: Open?}")
+        await caller.ask("cancel_skill")
+    for told in (asked, shown):
+        assert 'It waits 40 s; without an answer it is "shut".' in told
+    assert "cancelled" in ended
+    assert "It waits 300 s; without an answer the step fails." in again
+
+
 async def test_a_question_that_nobody_answers_has_the_answer_its_asker_gave(
     tmp_path: Path,
 ) -> None:
@@ -247,7 +261,7 @@ parallel:
         told = await caller.until("succeeded")
         await caller.ask("run_mission", tree=tree.replace("  otherwise: shut\n", ""))
         failed = await caller.until("failed")
-    assert 'by: "nobody"' in told
+    assert 'by: "otherwise"' in told
     assert "not_answered" in failed
 
 

@@ -354,6 +354,27 @@ async def test_a_pose_off_the_map_is_refused_with_its_bounds(tmp_path: Path) -> 
     assert report["n_places"] == 0
 
 
+@pytest.mark.parametrize(
+    ("description", "is_kept"),
+    [
+        ("A person stands here.", False),
+        ("There are two people in it. A man is sitting.", False),
+        ("A person stands here. A small room with a desk.", True),
+        ("Staff room.", True),
+    ],
+)
+async def test_a_place_of_which_only_people_are_told_is_no_place(
+    tmp_path: Path, description: str, *, is_kept: bool
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        record = {"name": "guard", "description": description, "safety_landmarks": ["person"]}
+        written = await client.call_tool("write_semantic_data", record)
+        known = report_of(await client.call_tool("get_semantic_data", {}))
+    assert written.is_error is not is_kept
+    assert known["n_places"] == is_kept
+    assert "People are left out" in text_of(written)
+
+
 async def test_where_all_that_was_given_is_refused_no_empty_place_is_made(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         result = await client.call_tool(

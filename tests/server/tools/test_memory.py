@@ -140,6 +140,7 @@ async def test_pictures_and_records_are_recalled_by_time_place_and_label(
         ladder = text_of(await client.call_tool("recall_episodes", {"label": "ladder"}))
         quiet = text_of(await client.call_tool("recall_episodes", {"words": "quiet", "room": "R2"}))
         picture_id = ladder.splitlines()[1].split(":")[0]
+        assert picture_id == "P1"
         shown = await client.call_tool("recall_episodes", {"picture_of": picture_id})
         strange = await client.call_tool("recall_episodes", {"picture_of": "nobody"})
         wrong = await client.call_tool("recall_episodes", {"since": "some day"})

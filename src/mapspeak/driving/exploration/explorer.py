@@ -258,6 +258,8 @@ class Explorer:
 
     def _report(self, world: WorldModel, bound: BoundKind | None, seen_id: str | None) -> Progress:
         told_ratio, self._told_ratio = self._told_ratio, known_ratio(world)
+        blocked = self._blocked(world)
+        others = self._trips.blocked if self._trips.n_blocked else ()
         return Progress(
             state=self._state,
             bounds=self._bounds,
@@ -279,7 +281,8 @@ class Explorer:
             pose=world.robot,
             pose_doubt=world.pose_doubt,
             unreachable=find_unreachable(world),
-            blocked=self._blocked(world),
+            blocked=blocked,
+            passed_over=tuple(each for each in others if each not in blocked),
             not_worth=find_not_worth(world),
             closed=tuple(world.map.areas),
             pictured_ratio=self._measure_pictured(world),

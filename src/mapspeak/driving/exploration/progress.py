@@ -90,6 +90,8 @@ class Progress:
         told_ratio: What the answer before told of that; None in the first one.
         frontiers: Where one could still go, best first.
         pose_doubt: Why it may be elsewhere.
+        blocked: Where a drive failed and something unknown is left.
+        passed_over: Where one failed and nothing is left, if this exploration counts any.
         pictured_ratio: Of the walls in sight of the floor in reach, the share that pictures show;
             None where the camera does not matter.
     """
@@ -118,6 +120,7 @@ class Progress:
     not_worth: tuple[RefusedFrontier, ...]
     closed: tuple[ClosedArea, ...]
     pictured_ratio: float | None = None
+    passed_over: tuple[BlockedPlace, ...] = ()
 
 
 def known_ratio(world: WorldModel) -> float:

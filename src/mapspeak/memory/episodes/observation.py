@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
@@ -187,6 +187,10 @@ class EpisodeMatch:
     near_id: str | None = None
     is_elsewhere: bool = False
 
+    def called(self, shown_id: str) -> "EpisodeMatch":
+        """Return the same under another id."""
+        return replace(self, observation=replace(self.observation, id=shown_id))
+
 
 def placed(seen: Observation, placings: Iterable[MapPlacing] | None) -> EpisodeMatch:
     """Return an observation with its pose on the map of the query, if its placing is known."""
@@ -213,6 +217,23 @@ class EpisodePage:
     n_matches: int
     anchor: EpisodeMatch | None = None
     next_page: EpisodeQuery | None = None
+
+
+def name_pictures(page: EpisodePage, ids: Mapping[str, str]) -> EpisodePage:
+    """Return a page on which pictures go by the short ids that some have.
+
+    Args:
+        ids: Of pictures, by their names in the memory's folder.
+    """
+
+    def name(match: EpisodeMatch) -> EpisodeMatch:
+        seen = match.observation
+        is_picture = seen.kind is ObservationKind.PICTURE
+        short = ids.get(seen.picture or "") if is_picture else None
+        return match if short is None else match.called(short)
+
+    anchor = None if page.anchor is None else name(page.anchor)
+    return replace(page, matches=tuple(map(name, page.matches)), anchor=anchor)
 
 
 def _require(is_right: object, what: str, expected: str) -> None:

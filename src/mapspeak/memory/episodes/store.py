@@ -150,12 +150,13 @@ class EpisodeStore:
             return self._search.find(connection, query, rank)
 
     def get(self, observation_id: str) -> Observation | None:
-        """Return the observation with an id, or None."""
+        """Return the observation with an id, or of a picture with a name, or None."""
         if not self.database.exists():
             return None
-        selection = f"SELECT {COLUMNS} FROM observations AS o WHERE o.id = ?"  # noqa: S608 - our own columns
+        wanted = "o.id = ? OR (o.picture = ? AND o.kind = 'picture') LIMIT 1"
+        selection = f"SELECT {COLUMNS} FROM observations AS o WHERE {wanted}"  # noqa: S608 - our own columns
         with self.database.reading() as connection:
-            row = connection.execute(selection, [observation_id]).fetchone()
+            row = connection.execute(selection, [observation_id] * 2).fetchone()
         return None if row is None else observation_from(row)
 
     def picture_path(self, observation: Observation) -> Path | None:

@@ -1,8 +1,10 @@
 """What is remembered nearest to a thing: by where things are, not where they were seen from."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
+from mapspeak.memory.episodes.observation import EpisodeMatch
 from mapspeak.places.candidate import last_seen
 from mapspeak.places.relations.unknown import no_such_place
 from mapspeak.places.things import THING_ID, find_things
@@ -63,3 +65,13 @@ def _find_called(world: WorldModel, words: str) -> list[RememberedThing]:
     if not called and THING_ID.fullmatch(words):
         raise no_such_place(world, words)
     return sorted(called, key=lambda each: last_seen(world, each) or NEVER, reverse=True)
+
+
+def in_rooms_of(world: WorldModel, matches: Iterable[EpisodeMatch]) -> Iterator[EpisodeMatch]:
+    """Yield observations with the room that their place is in now: ids change as a map grows."""
+    for match in matches:
+        if match.is_elsewhere:
+            yield match
+            continue
+        room_id = world.find_room_id(match.observation.pose.point)
+        yield replace(match, observation=replace(match.observation, room_id=room_id))

@@ -88,13 +88,13 @@ class ExploreAnswer(Report):
     known_area_m2: float = Field(description="free floor on the map")
     known_percent: float = Field(description="of the floor that is to be expected")
     walls_pictured_percent: float | None = Field(description="of those in sight; for the camera")
-    frontiers: list[str] = Field(description="ids, best first")
+    frontiers: list[str] = Field(description="ids, the one under way first, then best first")
     n_frontiers: int
     next: str = Field(description="the frontier under way, and why it was chosen")
     goal_id: str | None
     robot: PoseReport
     pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
-    cannot_reach: list[str] = Field(description="what is left, where, and why")
+    cannot_reach: list[str] = Field(description="what was blocked or is left, where, and why")
     next_step: str
 
     @classmethod
@@ -114,7 +114,7 @@ class ExploreAnswer(Report):
             known_area_m2=round(progress.known_area_m2, 1),
             known_percent=round(100 * progress.known_ratio, 1),
             walls_pictured_percent=_percent(progress.pictured_ratio),
-            frontiers=[frontier.id for frontier in progress.frontiers[:MOST_NAMED]],
+            frontiers=_list_frontiers(progress)[:MOST_NAMED],
             n_frontiers=len(progress.frontiers),
             next=_say_next(progress),
             goal_id=None if trip is None else trip.goal_id,
@@ -123,6 +123,12 @@ class ExploreAnswer(Report):
             cannot_reach=_say_rest(progress),
             next_step=lead(_find_next_step(progress)),
         )
+
+
+def _list_frontiers(progress: Progress) -> list[str]:
+    ids = [frontier.id for frontier in progress.frontiers]
+    under_way = "" if progress.trip is None else progress.trip.target.id
+    return sorted(ids, key=lambda each: each != under_way)
 
 
 def _find_next_step(progress: Progress) -> str:
@@ -146,6 +152,7 @@ def _say_rest(progress: Progress) -> list[str]:
     told = [
         *(say_blocked(place) for place in progress.blocked),
         *(say_unreachable(border) for border in progress.unreachable),
+        *(f"{say_blocked(place)} Nothing is left there." for place in progress.passed_over),
     ]
     left_out = len(told) - MOST_NAMED
     return told if left_out <= 0 else [*told[:MOST_NAMED], f"and {left_out} more"]

@@ -146,7 +146,10 @@ def say_question(question: Question) -> str:
     """Return a question with the answers that are taken."""
     taken = f" Answers: {', '.join(map(_say_value, question.answers))}." if question.answers else ""
     about = "" if question.picture is None else f" About picture {question.picture_id}."
-    return f"{question.id}: {quote(question.text, most=MOST_SENTENCE)}.{taken}{about}"
+    fallback = question.otherwise
+    ends = "the step fails" if fallback is None else f"it is {_say_value(fallback)}"
+    waits = f" It waits {question.within_s:g} s; without an answer {ends}."
+    return f"{question.id}: {quote(question.text, most=MOST_SENTENCE)}.{taken}{waits}{about}"
 
 
 def say_waiting(questions: QuestionBook) -> str:

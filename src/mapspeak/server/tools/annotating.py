@@ -22,6 +22,7 @@ from mapspeak.memory import (
     TakenPicture,
     Waypoint,
     find_concern,
+    find_passing,
     is_purpose,
     noted_at,
     tells_what_to_do,
@@ -152,8 +153,12 @@ class Annotator:
         Raises:
             SemanticMapError: All that was said of it is refused.
         """
-        says = waypoint.landmarks or waypoint.description or waypoint.geometric_features
-        if self.refused and not says:
+        said = waypoint.description
+        passing = find_passing(said)
+        says = waypoint.landmarks or waypoint.geometric_features
+        if not says and passing is not None:
+            self.refused.append(f"{said!r}: {LEFT_OUT[passing]}")
+        if not says and self.refused and (passing is not None or not said):
             raise SemanticMapError(
                 f"Nothing of {waypoint.name!r} can be remembered, so nothing was written. "
                 f"{' '.join(self.refused)}",

@@ -1,6 +1,6 @@
 """The tools of the memory besides finding: its faults, what was observed, what is the matter."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from typing import Annotated
@@ -11,11 +11,11 @@ from pydantic import Field
 from mapspeak.errors import GoalError, LinkError, MapError, SemanticMapError
 from mapspeak.memory.episodes.observation import (
     EpisodeFilter,
-    EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
     EpisodeQuery,
     ObservationKind,
+    name_pictures,
     placed,
 )
 from mapspeak.memory.events import Effect as EventEffect
@@ -24,7 +24,7 @@ from mapspeak.memory.store.forgetting import restore
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import find_renamed
 from mapspeak.places.recall import events
-from mapspeak.places.recall.nearby import find_nearby
+from mapspeak.places.recall.nearby import find_nearby, in_rooms_of
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.places.things import forget
 from mapspeak.server.text.episodes import describe_episodes, describe_nearby, say_episode
@@ -72,7 +72,7 @@ Until = Annotated[str | None, Field(description="before; likewise", max_length=4
 Label = Annotated[str | None, Field(description="a thing seen, by its label", max_length=120)]
 Kind = Annotated[ObservationKind | None, Field(description="what they came from")]
 PictureOf = Annotated[
-    str | None, Field(description="id of one observation: shows its picture", max_length=40)
+    str | None, Field(description="P3, or id of an observation: shows its picture", max_length=80)
 ]
 Text = Annotated[
     str, Field(description="what is the matter, in a sentence", min_length=1, max_length=300)
@@ -178,17 +178,22 @@ class MemoryTools:
         return describe_episodes(page, now=now, summed=whole.matches)
 
     def _find(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
+        """Return what passes a query; a picture that is known by a short id goes by that."""
+        ids = {each.name: each.id for each in self._session.pictures.taken}
+        return name_pictures(self._find_in_rooms(query, world), ids)
+
+    def _find_in_rooms(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
         """Return the observations that pass a query, in the rooms of the map as it is now."""
         find = self._session.find_episodes
         if world is None:
             return find(query)
         if query.room_id is None:
             page = find(query)
-            return replace(page, matches=tuple(_in_rooms_of(world, page.matches)))
+            return replace(page, matches=tuple(in_rooms_of(world, page.matches)))
         whole = find(replace(query, room_id=None, limit=ALL, offset=0))
         found = [
             replace(match, filters=(*match.filters, EpisodeFilter.ROOM))
-            for match in _in_rooms_of(world, whole.matches)
+            for match in in_rooms_of(world, whole.matches)
             if match.observation.room_id == query.room_id
         ]
         end = query.offset + query.limit
@@ -341,14 +346,16 @@ class MemoryTools:
         return keeping.fault
 
     async def _show(self, observation_id: str) -> list[str | Image]:
-        store = self._session.episodes.store
-        seen = await self._session.compute(lambda: store.get(observation_id.strip()))
+        store, taken = self._session.episodes.store, self._session.pictures.find(observation_id)
+        name = observation_id.strip() if taken is None else taken.name
+        seen = await self._session.compute(lambda: store.get(name))
         if seen is None:
             raise SemanticMapError(
                 f"There is no observation {observation_id[:40]!r}.",
                 hint=lead("Call {recall_episodes} without picture_of for their ids."),
             )
         match = placed(seen, self._session.memory.place_maps())
+        match = match if taken is None else match.called(taken.id)
         said = say_episode(match, now=self._session.find_wall_time())
         path = await self._session.compute(lambda: store.picture_path(seen))
         if path is None:
@@ -370,16 +377,6 @@ def _require_present_ids(world: WorldModel, words: str) -> None:
             say_renamed(renamed),
             hint=f"Nothing was changed; say {now} where that is meant.",
         )
-
-
-def _in_rooms_of(world: WorldModel, matches: Iterable[EpisodeMatch]) -> Iterator[EpisodeMatch]:
-    """Yield observations with the room that their place is in now: ids change as a map grows."""
-    for match in matches:
-        if match.is_elsewhere:
-            yield match
-            continue
-        room_id = world.find_room_id(match.observation.pose.point)
-        yield replace(match, observation=replace(match.observation, room_id=room_id))
 
 
 def _without(

@@ -82,7 +82,10 @@ def thing_lines(world: WorldModel, remembered: RememberedThing) -> Iterator[str]
     yield from _view_lines(world, remembered)
     yield from _trust_lines(candidate.trust)
     if candidate.pictures:
-        yield f"In the pictures {', '.join(map(tell_name, candidate.pictures[:MOST_VIEWS]))}."
+        names = ", ".join(map(tell_name, candidate.pictures[:MOST_VIEWS]))
+        yield lead(
+            "In the pictures {names}. {recall_episodes} with picture_of shows one.", names=names
+        )
     if candidate.last_seen is not None:
         yield f"Last seen at {candidate.last_seen.isoformat(timespec='seconds')}."
 

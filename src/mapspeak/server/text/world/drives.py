@@ -194,14 +194,20 @@ EXPLORATION_STATES = {
 
 
 def say_progress(progress: Progress) -> str:
-    """Say why a call of an exploration ended as it did, and why the known share fell if it did."""
+    """Say why a call of an exploration ended as it did, and why the known share fell if it did.
+
+    At its end also how much of the walls pictures show, where that matters.
+    """
+    said, walls = _say_progress(progress), progress.pictured_ratio
+    if walls is not None and progress.state.is_end:
+        said += f" Pictures show {walls:.1%} of the walls."
     if progress.told_ratio is None:
-        return _say_progress(progress)
+        return said
     told, known = (f"{100 * share:.1f} %" for share in (progress.told_ratio, progress.known_ratio))
     if progress.known_ratio >= progress.told_ratio or known == told:
-        return _say_progress(progress)
+        return said
     return (
-        f"{_say_progress(progress)} More floor can be expected than before, so that less of it "
+        f"{said} More floor can be expected than before, so that less of it "
         f"is known: {known}, {told} before."
     )
 
@@ -213,9 +219,7 @@ def _say_progress(progress: Progress) -> str:
         case ExplorationState.BOUND_REACHED:
             return f"{_say_reached(progress)}{_say_left(progress)}"
         case ExplorationState.NOTHING_LEFT:
-            walls = progress.pictured_ratio
-            shown = "" if walls is None else f" Pictures show {walls:.1%} of the walls."
-            return f"Nothing is left to explore{_say_not_worth(progress.not_worth)}.{shown}"
+            return f"Nothing is left to explore{_say_not_worth(progress.not_worth)}."
         case ExplorationState.REST_UNREACHABLE:
             return _say_rest(progress)
         case ExplorationState.INTERRUPTED if said := say_trip_end(progress.trip_end):

@@ -288,7 +288,7 @@ def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     doors = [world.rooms.find_doubtful_door(room) for room in rooms]
     sure = [room for room, door in zip(rooms, doors, strict=True) if door is None]
     unsure = [
-        (f"{room.id} ({_say_floor(world, room)} m2{_say_against(sure, room)})", door)
+        (f"{room.id} ({say_floor(world, room)} m2{_say_against(sure, room)})", door)
         for room, door in zip(rooms, doors, strict=True)
         if door
     ]
@@ -349,7 +349,7 @@ def _region_row(world: WorldModel, region: Region) -> Sequence[str]:
     doubt = f" ({say_doubtful_door(region, doubtful)})" if doubtful else ""
     return (
         region.id,
-        f"{_say_floor(world, region)}{doubt}",
+        f"{say_floor(world, region)}{doubt}",
         f"{region.free_area_m2:.1f}",
         f"{region.length_m:.1f} x {region.width_m:.1f}",
         say_point(choose_standing_point(world, region)),
@@ -364,13 +364,13 @@ def _say_door(world: WorldModel, region: Region, door: Door) -> str:
     return f"{door.id}>{other if one == region.id else one}{'' if is_passable else ' (no way)'}"
 
 
-def _say_floor(world: WorldModel, region: Region) -> str:
+def say_floor(world: WorldModel, region: Region) -> str:
     """Return how much floor a region has, with a mark where not all of it has been seen."""
     return f"{region.floor_area_m2:.1f}{'+' if region.id in world.growth_m2 else ''}"
 
 
 def _say_size(world: WorldModel, room: Region) -> str:
-    return f"{room.id} ({_say_floor(world, room)} m2)"
+    return f"{room.id} ({say_floor(world, room)} m2)"
 
 
 def list_sure_rooms(world: WorldModel) -> list[Region]:

@@ -21,7 +21,7 @@ from mapspeak.server.text.wording import build_table, join_words, say_path, say_
 from mapspeak.server.text.world.drives import say_end
 from mapspeak.server.text.world.maps import say_refusal
 from mapspeak.server.text.world.notices import say_obstruction, say_warnings
-from mapspeak.server.text.world.tables import say_sizes
+from mapspeak.server.text.world.tables import say_floor, say_sizes
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedThing
@@ -237,7 +237,7 @@ def _size_table(world: WorldModel, regions: Sequence[Region]) -> str:
         by_size[:MOST_SIZES],
         lambda region: (
             region.id,
-            f"{region.floor_area_m2:.1f}",
+            say_floor(world, region),
             f"{region.free_area_m2:.1f}",
             f"{region.floor_area_m2 / least_m2:.2f}",
         ),

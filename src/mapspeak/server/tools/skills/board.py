@@ -40,7 +40,6 @@ MOST_QUOTE = 300
 Handle = Annotated[
     str | None, Field(description="such as S1; the latest when left out", max_length=40)
 ]
-OwnHandle = Annotated[str, Field(description="such as S1", max_length=40)]
 WAIT = SkillParameter(
     "wait_s",
     ParameterKind.NUMBER,
@@ -79,7 +78,7 @@ class SkillRunTools:
         ToolEffect.STOPS,
         leads="Use {stop_robot} instead when anything is urgent.",
     )
-    async def cancel_skill(self, run: OwnHandle) -> str:
+    async def cancel_skill(self, run: Handle = None) -> str:
         """Cancel a run of a skill; nothing of it goes on at the robot then."""
         found = self._runs.find(run)
         if found.is_over:

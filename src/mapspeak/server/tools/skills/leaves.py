@@ -369,6 +369,8 @@ class Leaves:
             tuple(given.get("answers", ())),
             picture=given.get("picture"),
             client=current_caller().session,
+            within_s=given["within_s"],
+            otherwise=given.get("otherwise"),
         )
         on_progress(SkillProgress(is_asking=True))
         try:
@@ -379,5 +381,5 @@ class Leaves:
         if question.answer is not None:
             return succeeded(answer=question.answer, by="answered")
         if "otherwise" in given:
-            return succeeded(answer=given["otherwise"], by="nobody")
+            return succeeded(answer=given["otherwise"], by="otherwise")
         return failed(SkillCode.NOT_ANSWERED)
