@@ -162,7 +162,7 @@ async def test_every_remembered_extinguisher_is_meant_at_once(client: Client) ->
         await client.call_tool("follow_route", {"stops": ["every extinguisher"], "wait_s": 25})
     )
     told = [*answer["done"], answer["next"].split(":")[0], *answer["remaining"]]
-    assert sorted(filter(None, told)) == ["T1", "T2"]
+    assert sorted(each.split(",")[0] for each in told if each) == ["T1", "T2"]
 
 
 async def test_a_name_that_reads_like_all_of_a_kind_is_the_name(client: Client) -> None:
@@ -188,6 +188,60 @@ async def test_of_some_rooms_the_smallest_is_told_as_that_of_these(client: Clien
     two = text_of(await client.call_tool("measure", {"places": [first, second]}))
     assert f"The only room of these: {second} (" in one
     assert f"The smaller room of these is {first} (" in two
+
+
+async def test_an_end_of_a_corridor_is_the_farther_one_unless_it_is_said_which(
+    client: Client,
+) -> None:
+    corridor = (await _ways(client, ["largest corridor"]))[0]
+    far, near, west = [
+        (await _goal(client, f"{end} of {corridor}"))
+        for end in ("the end", "near end", "the west end")
+    ]
+    assert near["pose"]["x"] < 3.0
+    assert far["pose"]["x"] > 9.0
+    assert west["pose"] == near["pose"]
+    assert "farther one by path" in far["reason"]
+    room = (await _sizes(client))[0]
+    refused = await client.call_tool("check_goal", {"place": f"end of {room}"})
+    assert f"the middle of {room}" in text_of(refused)
+
+
+async def test_the_left_door_is_the_left_one_as_the_robot_sees_it(client: Client) -> None:
+    corridor = (await _ways(client, ["largest corridor"]))[0]
+    doors = await _ways(client, [f"all doors of {corridor}"])
+    await client.call_tool("navigate_to", {"x": 5.5, "y": 3.5, "yaw_deg": 0})
+    told = [
+        text_of(await client.call_tool("measure", {"places": [words]}))
+        for words in (f"left door of {corridor}", "the right hand door")
+    ]
+    left, right = re.findall(r"^(D\d+) is the (?:left|right) one", "\n".join(told), re.MULTILINE)
+    await client.call_tool("turn", {"by_deg": 180})
+    behind = text_of(await client.call_tool("measure", {"places": ["the left door"]}))
+    assert {left, right} <= set(doors)
+    assert left != right
+    assert all("as seen from the robot, looking east" in each for each in told)
+    assert "looking west" in behind
+    assert f"{left} is the left one" not in behind
+
+
+async def test_rooms_are_meant_by_how_many_doors_they_have(client: Client) -> None:
+    assert sorted(await _ways(client, ["rooms with one door"])) == sorted(await _sizes(client))
+    none = text_of(await client.call_tool("measure", {"places": ["rooms with two doors"]}))
+    assert "No room has 2 doors" in none
+
+
+async def test_start_is_where_the_robot_was_first(client: Client) -> None:
+    began = (await _goal(client, "robot"))["pose"]
+    await client.call_tool("navigate_to", {"place": "largest room"})
+    back = report_of(await client.call_tool("navigate_to", {"place": "start"}))
+    assert (back["robot"]["x"], back["robot"]["y"]) == (began["x"], began["y"])
+
+
+@pytest.mark.parametrize("words", ["2 m to my left", "left of me"])
+async def test_who_says_me_is_told_how_the_robot_is_meant(client: Client, words: str) -> None:
+    answer = await client.call_tool("check_goal", {"place": words})
+    assert "left of the robot" in text_of(answer)
 
 
 @pytest.mark.parametrize(

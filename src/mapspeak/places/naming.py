@@ -34,6 +34,8 @@ SPOT = re.compile(
     rf"(?:\s*[,; ]\s*(?:yaw\s*=?\s*)?(?P<yaw_deg>{NUMBER})(?:\s*deg)?)?\s*\)?"
 )
 ROBOT_NAMES = ("robot", "here")
+START = "start"
+"""What the place is called where the robot, or a route, began."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +174,9 @@ def _find_by_name(world: WorldModel, name: str) -> Place | None:
 def _read_spot(world: WorldModel, words: str) -> Place | None:
     if words.casefold() in ROBOT_NAMES:
         return Place("robot", Spot(world.robot.point, world.robot.yaw_rad))
+    if words.casefold() == START:
+        spot = Spot(world.start.point, world.start.yaw_rad)
+        return Place(START, spot, "where the robot was when this map was first looked at")
     match = SPOT.fullmatch(words)
     if match is None:
         return None
@@ -198,3 +203,97 @@ def find_elsewhere(memory: SemanticMap, words: str) -> tuple[Waypoint, ...]:
 def _contains_words(text: str, words: str) -> bool:
     # Most names are not in the text at all, and a pattern for each would take seconds to compile.
     return words in text and bool(re.search(rf"(?<!\w){re.escape(words)}(?!\w)", text))
+
+
+def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
+    if find_elsewhere(world.memory, wanted):
+        return "Let the robot see more of the building", NextStep.ALIGN
+    if ID.fullmatch(wanted):
+        return _say_ids(world, wanted[0].upper()), NextStep.SEE_PLACES
+    phrases = _say_phrases(world, wanted)
+    guesses = _guess(world, wanted) if world.places and not IDS.fullmatch(wanted) else ()
+    if guesses:
+        return f"{_say_guesses(guesses)} {phrases}", NextStep.READ_MORE
+    return phrases, NextStep.SEE_PLACES
+
+
+def _say_ids(world: WorldModel, letter: str) -> str:
+    """Say which ids of a kind there are, else all."""
+    groups = {
+        "rooms and corridors": [region.id for region in world.rooms.regions],
+        "doors": [door.id for door in world.rooms.doors],
+        "frontiers": [frontier.id for frontier in world.frontiers.frontiers],
+        "remembered": [place.id for place in world.places],
+    }
+    same = {name: ids for name, ids in groups.items() if any(each[0] == letter for each in ids)}
+    known = [f"{name} {_some_of(ids)}" for name, ids in (same or groups).items() if ids]
+    return f"Known are {'; '.join(known) or 'no places yet'}."
+
+
+def _guess(world: WorldModel, wanted: str) -> tuple[EntryCandidate, ...]:
+    """Return what may be meant; by a bare noun no thing that is only like it: a "kitchen"."""
+    answer = world.recollection.find(wanted, limit=MOST_GUESSES)
+    if answer.verdict is Verdict.NOT_REMEMBERED:
+        return ()
+    is_bare = len(ARTICLE.sub("", wanted, count=1).split()) == 1
+    return tuple(
+        each
+        for each in answer.candidates
+        if not (is_bare and each.basis is Basis.MEANING and each.entry.kind is EntryKind.THING)
+    )
+
+
+MOST_PHRASES = 3
+COUNTED = re.compile(r"\b[a-z][a-z0-9]*?(?=s?\b)")
+"""Words, a plural as its singular."""
+
+
+def _say_phrases(world: WorldModel, wanted: str) -> str:
+    """Say what words would be read here, those first that share most with the words."""
+    said = set(COUNTED.findall(wanted.casefold()))
+    # Who drives a robot speaks of it so; a person may mean himself, and is asked.
+    said |= {"robot"} if said & {"me", "my"} else set()
+    near = sorted(_list_phrases(world, wanted), key=lambda each: -_count_shared(each, said))
+    return f"Such words can be read: {', '.join(map(repr, near[:MOST_PHRASES]))}."
+
+
+def _count_shared(phrase: str, said: set[str]) -> int:
+    return len(said & set(COUNTED.findall(phrase.casefold())) - {"of", "the", "to", "in"})
+
+
+def _list_phrases(world: WorldModel, wanted: str) -> Iterator[str]:
+    """Yield phrases that mean something here, of the regions that the words name."""
+    regions = world.rooms.regions
+    named = [each for each in regions if re.search(rf"\b{each.id}\b", wanted, re.IGNORECASE)]
+    kinds = {
+        "room": any(each.room_class is RoomClass.ROOM for each in regions),
+        "door": bool(world.rooms.doors),
+        "corridor": any(each.room_class is RoomClass.CORRIDOR for each in regions),
+    }
+    for region in named[:1]:
+        if world.rooms.doors_of(region):
+            yield f"all doors of {region.id}"
+        yield from (f"{where} {region.id}" for where in ("the middle of", "next to", "facing"))
+    known = [kind for kind, is_known in kinds.items() if is_known]
+    yield from (f"nearest {kind}" for kind in known)
+    yield from (f"largest {kind}" for kind in known)
+    yield from (f"all {kind}s" for kind in known)
+    yield from (f"the middle of {each.id}" for each in regions[:1])
+    yield "2 m in front of the robot"
+    yield "left of the robot"
+
+
+def _say_guesses(guesses: Sequence[EntryCandidate]) -> str:
+    """Name what may be meant, for the reader to confirm: likeness alone does not make a goal."""
+    first = guesses[0]
+    by = "meaning" if first.basis is Basis.MEANING else "words"
+    told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in guesses)
+    return (
+        f"Nothing remembered is called so; nearest in {by}: {told}. If {first.entry.id} is meant, "
+        f"use {first.entry.id}."
+    )
+
+
+def _some_of(ids: list[str]) -> str:
+    shown = " ".join(ids[:MOST_NAMED])
+    return shown if len(ids) <= MOST_NAMED else f"{shown} and {len(ids) - MOST_NAMED} more"

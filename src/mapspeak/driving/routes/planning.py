@@ -11,7 +11,7 @@ from mapspeak.driving.routes.ordering import RouteOrder, order_shortest
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import GoalCheck, say_refusal
-from mapspeak.places.naming import AmbiguousPlaceError, Place, Spot
+from mapspeak.places.naming import START, AmbiguousPlaceError, Place, Spot
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_group, find_place
 from mapspeak.places.relations.grammar import Superlative, parse_relation
 from mapspeak.places.relations.superlatives import find_all_near
@@ -20,8 +20,6 @@ from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel
 
-START = "start"
-"""What the place is called where a route begins."""
 MOST_CANDIDATES = 12
 LEAST_SAID_RATIO = 0.75
 """Words that are not a name need at least this similarity to a place."""

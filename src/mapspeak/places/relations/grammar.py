@@ -8,6 +8,7 @@ from functools import cache
 from mapspeak.places.relations.vocabulary import (
     COUNT,
     DISTANCE,
+    DOORS,
     GAP,
     ORDER,
     ORDERS,
@@ -119,6 +120,19 @@ class Middle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class End:
+    """An end of a corridor.
+
+    Attributes:
+        compass: On which side; None for the farther one by path from the robot, or the nearer.
+    """
+
+    of: str
+    compass: Compass | None = None
+    is_near: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Superlative:
     """The nearest thing of a kind or a name, the second-smallest, and so on.
 
@@ -145,6 +159,7 @@ class Several:
         label: What these are called; else empty.
         count: How many; None for all.
         at: The room they are of, or from where ways are measured; None for all and the robot.
+        n_doors: Regions with so many doors; None for any.
     """
 
     kind: Kind | None = None
@@ -152,9 +167,10 @@ class Several:
     order: Order = Order.NEAREST
     count: int | None = None
     at: str | None = None
+    n_doors: int | None = None
 
 
-Standing = Towards | Away | NextTo | Facing | Turned | Between | Corner | WallSide | Middle
+Standing = Towards | Away | NextTo | Facing | Turned | Between | Corner | WallSide | Middle | End
 """What means where to stand."""
 Relation = Standing | Superlative | Several
 
@@ -273,6 +289,10 @@ def _read_some(kind: Kind | None) -> Read:
     return read
 
 
+def _read_with_doors(kind: Kind) -> Read:
+    return lambda match: Several(kind=kind, n_doors=read_count(match["doors"]))
+
+
 def _read_all(kind: Kind) -> Read:
     return lambda match: Several(kind=kind, at=match["at"])
 
@@ -316,6 +336,13 @@ FORMS: tuple[tuple[str, Read], ...] = (
         _read_wall,
     ),
     (rf"{AT}(?:middle|cent(?:er|re)) of{OPEN}(?P<of>.+)", lambda m: Middle(m["of"])),
+    (
+        (
+            rf"{AT}(?:(?:(?P<near>near(?:er|est)?)|far(?:ther)?|other|{COMPASS}) )?"
+            rf"end of{OPEN}(?P<of>.+)"
+        ),
+        lambda m: End(of=m["of"], compass=read_compass(m["compass"]), is_near=bool(m["near"])),
+    ),
     *(
         (
             rf"{AT}{RANK}{ORDER} (?:{words})(?: (?:to|from) (?P<to>.+))?",
@@ -329,6 +356,11 @@ FORMS: tuple[tuple[str, Read], ...] = (
             _read_some(kind),
         )
         for kind, words in KINDS.items()
+    ),
+    *(
+        (rf"(?:{ALL} )?(?:{words})s? with {DOORS} doors?", _read_with_doors(kind))
+        for kind, words in KINDS.items()
+        if kind in (Kind.ROOM, Kind.CORRIDOR, Kind.OPEN_SPACE)
     ),
     *(
         (rf"{ALL} (?:{words})s?(?: (?:of|in) (?P<at>.+))?", _read_all(kind))

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.naming import Place, say_spot
+from mapspeak.places.relations.grammar import End
 from mapspeak.places.relations.placement import find_reachable_cells, join_or, refuse, stand
 from mapspeak.places.relations.vocabulary import Compass, read_heading
 from mapspeak.places.standing import cells_of, facing_in
@@ -167,6 +168,38 @@ def stand_in_middle(world: WorldModel, region: Region) -> Place:
     off_m = point.distance_to(middle)
     reason = f"{off_m:.1f} m from the middle of {region.id}, looking where most of it lies"
     return stand(point, reason, facing_in(world, region, point))
+
+
+def stand_at_end(world: WorldModel, region: Region, wanted: End) -> Place:
+    """Find where to stand at an end of a corridor, coming straight on.
+
+    Raises:
+        GoalError: It is no corridor, or the robot gets to no such end.
+    """
+    is_corridor = region.room_class is RoomClass.CORRIDOR
+    walk = world.map.walk_along(region) if is_corridor else None
+    if walk is None:
+        middle = f"the middle of {region.id}"
+        raise refuse(f"{region.id} is not a corridor with doors: it has no ends.", [middle])
+    ends: list[tuple[float, Point, str]] = []
+    for end, other in ((walk.start, walk.end), (walk.end, walk.start)):
+        floor = find_reachable_cells(world, end, MIDDLE_M)
+        is_here = (floor.regions == region.index) & (floor.away_m(end) <= MIDDLE_M)
+        point = floor.choose(world, is_here, floor.away_m(end))
+        if point is not None:
+            name = f"the {read_heading(other.bearing_to(end))} end of {region.id}"
+            ends.append((floor.at(floor.paths_m, point), point, name))
+    if not ends:
+        raise refuse(f"The robot gets to no end of {region.id}.")
+    if wanted.compass is None:
+        _, point, name = min(ends) if wanted.is_near else max(ends)
+        which = "nearer" if wanted.is_near else "farther"
+        return stand(point, f"{name}, the {which} one by path from the robot")
+    heading_rad = wanted.compass.heading_rad
+    _, point, name = max(
+        ends, key=lambda end: math.cos(walk.middle.bearing_to(end[1]) - heading_rad)
+    )
+    return stand(point, name)
 
 
 def stand_in_corner(world: WorldModel, corners: Sequence[RoomCorner]) -> Place:

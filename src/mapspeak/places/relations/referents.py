@@ -22,7 +22,7 @@ from mapspeak.places.naming import (
 from mapspeak.places.relations.grammar import Superlative, parse_relation
 from mapspeak.places.relations.outlines import find_sides
 from mapspeak.places.relations.placement import refuse
-from mapspeak.places.relations.vocabulary import GAP, pattern, plain
+from mapspeak.places.relations.vocabulary import GAP, Side, pattern, plain, read_heading
 from mapspeak.places.standing import point_ahead
 from mapspeak.places.things import find_place_ids, find_things
 from mapspeak.places.ways import standing_point
@@ -228,7 +228,8 @@ CLASSES = {
 }
 """What a word may be said of; other words of all."""
 DOOR = pattern(
-    r"(?:door|doorway)(?: (?:between (?P<one>.+?) and (?P<other>.+)|(?:of|in|to) (?P<room>.+)))?"
+    r"(?:(?P<side>left|right)(?: hand)? )?(?:door|doorway)"
+    r"(?: (?:between (?P<one>.+?) and (?P<other>.+)|(?:of|in|to) (?P<room>.+)))?"
 )
 OF_PLACE = pattern(r"(?P<label>.+?) (?:of|at|seen from|from) (?P<place>.+)")
 
@@ -341,6 +342,23 @@ def _find_thing(world: WorldModel, wanted: str) -> Referent | None:
     )
 
 
+def _choose_by_side(world: WorldModel, room: Region, doors: list[Door], side: Side) -> Place:
+    """Return the leftmost or rightmost door of a room as the robot sees it.
+
+    In the room it looks along its own heading; from outside, at the middle of the room.
+    """
+    robot, is_inside = world.robot, world.find_room_id(world.robot.point) == room.id
+    look_rad = robot.yaw_rad if is_inside else robot.point.bearing_to(room.widest)
+
+    def turn_rad(door: Door) -> float:
+        return math.remainder(robot.point.bearing_to(door.place) - look_rad, math.tau)
+
+    door = max(doors, key=turn_rad) if side is Side.LEFT else min(doors, key=turn_rad)
+    sees = f"as seen from {ROBOT}, looking {read_heading(look_rad)}"
+    which = f"the {side.removesuffix(' of')} one of the {len(doors)} doors of {room.id}"
+    return Place(door.id, door, f"{which} {sees}")
+
+
 def _find_only_door(world: WorldModel, wanted: str) -> Place | None:
     """Find "the door": the only one of the room that is named, or that the robot stands in."""
     match = DOOR.fullmatch(wanted)
@@ -356,6 +374,8 @@ def _find_only_door(world: WorldModel, wanted: str) -> Place | None:
     doors = [door for door in world.rooms.doors if ids <= set(door.region_ids)]
     if len(doors) == 1:
         return Place(doors[0].id, doors[0])
+    if match["side"] and len(rooms) == 1 and doors:
+        return _choose_by_side(world, rooms[0], doors, Side(f"{match['side'].casefold()} of"))
     said = " and ".join(room.id for room in rooms)
     has = f"{said} {'have' if len(rooms) > 1 else 'has'} {len(doors)} doors"
     shown = ", ".join(door.id for door in doors[:MOST_NAMED]) or "none"

@@ -13,6 +13,7 @@ from mapspeak.places.relations.grammar import (
     Away,
     Between,
     Corner,
+    End,
     Facing,
     Middle,
     NextTo,
@@ -31,6 +32,7 @@ from mapspeak.places.relations.outlines import (
     find_corners,
     find_middle,
     find_walls,
+    stand_at_end,
     stand_at_wall,
     stand_in_corner,
     stand_in_middle,
@@ -158,6 +160,8 @@ class Reader:
                 place = stand_at_wall(world, walls, is_along=is_along)
             case Middle(of):
                 place = self._stand_in_middle(self._refer(of, n_left))
+            case End(of=of):
+                place = stand_at_end(world, self._region_of(of, n_left), relation)
         return place
 
     def find_several(self, relation: Several) -> tuple[Place, ...]:
@@ -310,7 +314,7 @@ class Reader:
         thing = self._refer(words, n_left)
         if thing.region is None:
             raise refuse(
-                f"{thing.name} is not a room or corridor: it has no corners or walls.",
+                f"{thing.name} is not a room or corridor: it has no corners, walls or ends.",
                 [f"next to {thing.name}"],
             )
         return thing.region

@@ -89,6 +89,11 @@ def find_several(world: WorldModel, words: Several, at: Referent | None) -> tupl
         return tuple(each.place for each in ranked[: words.count])
     everything = _list(world, words, SIZED_CLASSES)
     found = [each for each in everything if _is_at(world, each, at)]
+    if words.n_doors is not None:
+        regions = [each for each in found if isinstance(each, Region)]
+        found = [each for each in regions if len(each.door_ids) == words.n_doors]
+        if not found:
+            raise refuse(f"No {words.kind} has {words.n_doors} doors.", [f"all {words.kind}s"])
     if not found and words.kind is not None:
         said = (
             f"{at.name} has no {words.kind}."

@@ -130,6 +130,8 @@ ORDER = rf"(?P<order>{'|'.join(ORDERS.values())})"
 RANK = rf"(?:(?P<rank>{'|'.join(RANKS)}) )?"
 COUNT = rf"(?P<count>[2-9]|1\d|{'|'.join(COUNTS[2:])})"
 
+DOORS = rf"(?P<doors>\d{{1,2}}|{'|'.join(COUNTS[1:])})"
+
 
 def read_order(word: str) -> Order:
     """Return what a word such as "closest" goes by."""
