@@ -89,7 +89,7 @@ def test_a_remembered_name_wins_over_coordinates_that_it_looks_like() -> None:
         ("", "'nearest room'"),
         ("1.5", "'nearest room'"),
         ("nan, 2", "'nearest room'"),
-        ("left door of R1", "'all doors of R1'"),
+        ("blue door of R1", "'all doors of R1'"),
         ("somewhere to the left", "'left of the robot'"),
     ],
 )

@@ -153,17 +153,13 @@ class WorldModel:
     ) -> None:
         self.map: MapRevision = revision or revise(grid, previous, radius_m=radius_m)
         self.robot = robot
-        # Before the first record, and while the memory cannot be read, a map has no id.
-        map_ids = {
-            None,
-            memory.map_id,
-            memory.map_id if previous is None else previous.memory.map_id,
-        }
-        self.start: Pose = previous.start if previous and len(map_ids) <= 2 else robot
         self.pose_doubt = pose_doubt
         self.is_radius_assumed = is_radius_assumed
         self.now = now
-        self.memory = memory
+        self.memory: SemanticMap = memory
+        # Before the first record, and while the memory cannot be read, a map has no id.
+        map_ids = {None, memory.map_id, None if previous is None else previous.memory.map_id}
+        self.start: Pose = previous.start if previous and len(map_ids) <= 2 else robot
         self.places: tuple[RememberedPlace, ...] = (
             previous.places
             if previous is not None and previous.memory.waypoints == memory.waypoints
