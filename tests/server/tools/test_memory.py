@@ -531,7 +531,7 @@ async def test_an_observation_tells_each_fact_once(tmp_path: Path) -> None:
     assert more.count(": picture at ") == 4
     for row in rows:
         assert re.fullmatch(
-            r"o\w+: picture at 12:00 \| from x [\d.]+, y 1\.00, yaw 0 deg, in R[12] \| "
+            r"P\d+: picture at 12:00 \| from x [\d.]+, y 1\.00, yaw 0 deg, in R[12] \| "
             r'saw "chair" \| \d\.\d m away',
             row,
         )
