@@ -103,6 +103,8 @@ COUNTED = re.compile(r"\b[a-z][a-z0-9]*?(?=s?\b)")
 def _say_phrases(world: WorldModel, wanted: str) -> str:
     """Say what words would be read here, those first that share most with the words."""
     said = set(COUNTED.findall(wanted.casefold()))
+    # Who drives a robot speaks of it so; a person may mean himself, and is asked.
+    said |= {"robot"} if said & {"me", "my"} else set()
     near = sorted(_list_phrases(world, wanted), key=lambda each: -_count_shared(each, said))
     respelt = _respell(wanted)
     if respelt is not None:
