@@ -40,8 +40,7 @@ class RoomSettings:
         stub_m: The shortest piece of wall, in line with such an opening, that is a jamb of it.
         tip_m: The thickest such piece.
         join_share: Places are joined that nothing divides with at least this certainty.
-        keep_share: So much more, or less, certain it must be that another division than that of
-            the map before is right.
+        keep_share: So much surer must be what divides otherwise than on the map before.
         room_area_m2: Smaller regions belong to their neighbour.
         part_area_m2: The same for a region that is hardly seen yet.
         least_clearance_m: Half the width that a region must have somewhere.
@@ -124,13 +123,11 @@ class Raster:
 
     def point_at(self, row: float, col: float) -> Point:
         """Return the place of a point of the raster; a cell's centre lies at +0.5, +0.5."""
-        ((x, y),) = self.points_at(np.array([row]), np.array([col])).tolist()
-        return Point(x, y)
+        return Point(*self.points_at(np.array([row]), np.array([col]))[0].tolist())
 
     def points_at(self, rows: FloatArray, cols: FloatArray) -> FloatArray:
         """Return the places of points of the raster, in metres, shape (n, 2)."""
-        there = np.stack([cols, rows, np.ones(len(rows))])
-        across, along = cv2.invertAffineTransform(self.there) @ there
+        across, along = cv2.invertAffineTransform(self.there) @ (cols, rows, np.ones(len(rows)))
         return self.grid.points_at(along - 0.5, across - 0.5)
 
     def on_grid(self, numbers: NDArray[np.int32]) -> NDArray[np.int16]:
@@ -154,8 +151,7 @@ def _sample(numbers: Numbers, there: Affine, shape: tuple[int, ...]) -> NDArray[
 def find_cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the rows and columns of the cells that are set, row by row; nonzero is far slower."""
     places = np.flatnonzero(mask)
-    rows, cols = np.divmod(places, mask.shape[1]) if places.size else (places, places)
-    return rows, cols
+    return np.divmod(places, mask.shape[1]) if places.size else (places, places)
 
 
 _ASK_FOR_LESS = "Ask for a part of it, or for a map at a coarser resolution."
@@ -167,11 +163,9 @@ def build_raster(grid: OccupancyGrid) -> Raster:
     Raises:
         MapError: The map has more cells than can be handled.
     """
-    if grid.cells.size > MAX_GRID_CELLS:
-        raise MapError(
-            f"The map has {grid.cells.size} cells, more than {MAX_GRID_CELLS}.",
-            hint=_ASK_FOR_LESS,
-        )
+    n = grid.cells.size
+    if n > MAX_GRID_CELLS:
+        raise MapError(f"The map has {n} cells, more than {MAX_GRID_CELLS}.", hint=_ASK_FOR_LESS)
     if max(grid.cells.shape) > MAX_SIDE_CELLS:
         raise MapError(
             f"One side of the map has {max(grid.cells.shape)} cells, more than {MAX_SIDE_CELLS}.",
