@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import WorldObject, is_in_sight
+from mapspeak.simulator import WorldObject, is_in_sight, load_world
 from sites import make_flat
 
 
@@ -36,3 +36,10 @@ def test_what_stands_in_front_of_a_thing_hides_it(tmp_path: Path) -> None:
     assert is_in_sight(flat, Point(4.0, 1.5), extinguisher)
     hidden = replace(flat, objects=(*flat.objects, *screen))
     assert not is_in_sight(hidden, Point(4.0, 1.5), extinguisher)
+
+
+def test_a_large_thing_does_not_hide_itself() -> None:
+    world = load_world("warehouse")
+    forklift = next(thing for thing in world.objects if thing.name == "forklift 1")
+    behind = forklift.pose.transform(Point(-2.2, 0.0))
+    assert is_in_sight(world, behind, forklift)

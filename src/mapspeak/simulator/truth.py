@@ -196,7 +196,7 @@ def _grid(cells: NDArray[np.integer[Any]], origin: Point) -> OccupancyGrid:
 EYE_BAND_M = (1.05, 1.15)
 """Obstacles as high as the camera, which hide what lies behind them."""
 OWN_SIZE_M = 0.5
-"""A thing itself, and what it stands in, do not hide it."""
+"""What a thing stands in does not hide it."""
 IN_WALL_M = 0.05
 """The surface of the wall that a thing hangs on does not hide it."""
 SIDEWAYS_M = (0.0, -0.1, 0.1, -0.2, 0.2)
@@ -209,7 +209,16 @@ class EyeLevel:
     def __init__(self, world: World) -> None:
         low_m, high_m = EYE_BAND_M
         self._walls = slice_world(replace(world, objects=()), low_m=low_m, high_m=high_m)
-        self._things = slice_world(replace(world, walls=(), doors=()), low_m=low_m, high_m=high_m)
+        self._things = replace(world, walls=(), doors=())
+        self._others: dict[str, Slice] = {}
+
+    def _slice_others(self, thing: WorldObject) -> Slice:
+        """Return what stands about beside a thing: of a forklift, most is far from its middle."""
+        if thing.name not in self._others:
+            others = tuple(each for each in self._things.objects if each.name != thing.name)
+            world, (low_m, high_m) = replace(self._things, objects=others), EYE_BAND_M
+            self._others[thing.name] = slice_world(world, low_m=low_m, high_m=high_m)
+        return self._others[thing.name]
 
     def find_sights(self, thing: WorldObject, places: FloatArray) -> Mask:
         """Return True for the places from which a thing is in sight, unless all of it is hidden.
@@ -226,7 +235,7 @@ class EyeLevel:
         reach_m = float(away_m.max(initial=0.0)) + max(SIDEWAYS_M)
         walls, things = (
             each.near(thing.pose.point, reach_m=reach_m).edges
-            for each in (self._walls, self._things)
+            for each in (self._walls, self._slice_others(thing))
         )
         is_seen = np.zeros(len(places), dtype=np.bool_)
         for sideways_m in SIDEWAYS_M:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from drawing import grid_from_text
-from fakes import FakeRobot
+from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.evaluation.agent import AgentEnd, Assignment, ToolClient
 from mapspeak.evaluation.agents.catalogue import SCRIPTS
@@ -13,6 +13,7 @@ from mapspeak.evaluation.agents.driver import ToolDriver
 from mapspeak.evaluation.agents.scripted import follow_script
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.geometry import Pose
+from mapspeak.robot import Detection
 from served import connect
 
 pytestmark = pytest.mark.anyio
@@ -66,3 +67,42 @@ async def test_a_script_without_ranges_notes_directions_alone(tmp_path: Path) ->
     (written,) = [call for call in ledger.made if call.tool == "write_semantic_data"]
     (landmark,) = written.arguments["safety_landmarks"]
     assert landmark == {"label": "fire extinguisher", "bearing_deg": 3.0}
+
+
+FRIDGE = Detection(label="fridge", confidence_ratio=0.9, bearing_rad=0.0, range_m=2.0)
+
+
+async def do(prompt: str, robot: FakeRobot, folder: Path, *tools: str) -> tuple[AgentEnd, Hearing]:
+    task = Assignment(prompt=prompt, system="", limits=Limits(), seed=0, server=(), folder=folder)
+    async with connect(robot, folder, tools=tools) as client:
+        ledger = Hearing()
+        return await follow_script(task, ToolClient(client, ledger)), ledger
+
+
+async def test_what_an_exploration_reports_of_its_way_is_noted_too(tmp_path: Path) -> None:
+    class Passing(FakeRobot):
+        async def fetch_detections(self) -> tuple[Detection, ...]:
+            return (FRIDGE,) if 1.6 < self.pose.x < 4.4 else ()
+
+    robot = Passing(two_rooms())
+    robot.detections = (FRIDGE,)
+    _, ledger = await do("Update the map while moving.", robot, tmp_path, "explore", "look_around")
+    written = [call.arguments for call in ledger.made if call.tool == "write_semantic_data"]
+    (passed,) = [each for each in written if each["functional_landmarks"]]
+    assert passed["x"] > 1.6
+
+
+async def test_a_thing_that_one_look_has_shown_is_looked_at_before_an_errand(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.detections = (FRIDGE,)
+    async with connect(robot, tmp_path) as client:
+        driver = ToolDriver(ToolClient(client, Hearing()))
+        await driver.record(await driver.see())
+        errand = 'Errand, all at once. Go to the nearest fridge and say "It is here." there.'
+        _, ledger = await do(errand, robot, tmp_path, "search_for")
+        assert "look_at" in ledger.calls
+        assert "search_for" not in ledger.calls
+        (thing,) = await driver.find_things("fridge")
+    assert len(thing["seen_from"]) == 2

@@ -69,6 +69,33 @@ def test_who_knows_the_truth_does_what_is_asked(tmp_path: Path, task: str, seed:
     assert result.score.is_success, result.score.reason
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "trials"),
+    [
+        ("flat_1", (("errand-faults", 3), ("errand-faults", 7), ("errand-fetch", 8))),
+        ("flat_2", (("errand-faults", 2), ("errand-fetch", 8))),
+    ],
+)
+def test_things_that_the_way_of_an_exploration_shows_are_gone_to(
+    tmp_path: Path, name: str, trials: tuple[tuple[str, int], ...]
+) -> None:
+    world = load_world(name)
+    preparation = Trial(
+        task="explore",
+        world=name,
+        seed=0,
+        agent="scripted",
+        representation="picture-table",
+        number=1,
+    )
+    attempt(tmp_path, preparation, world, None)
+    for task, seed in trials:
+        trial = replace(preparation, task=task, seed=seed, number=seed + 1)
+        result = attempt(tmp_path, trial, world, preparation)
+        assert result.score.is_success, (task, seed, result.answer, result.score.reason)
+
+
 def test_a_trial_can_be_watched_in_a_live_page(tmp_path: Path) -> None:
     world, address, seen = make_flat(tmp_path), find_free_address(), list[int]()
     preparation = prepare(tmp_path, world)

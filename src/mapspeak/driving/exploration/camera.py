@@ -1,7 +1,8 @@
 """Driving for pictures: which walls no picture shows yet, and where to stop for one."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -15,7 +16,7 @@ from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.exploration.trips import Target, TripContext, name_turn, turn_to
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory import PictureBook
+from mapspeak.memory import PictureBook, PictureReading, TakenPicture
 from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
 from mapspeak.places.relations.viewpoints import (
     Face,
@@ -24,7 +25,7 @@ from mapspeak.places.relations.viewpoints import (
     face_room,
     find_room_near,
 )
-from mapspeak.places.standing import spread_places
+from mapspeak.places.standing import point_ahead, spread_places
 from mapspeak.robot import GoalState
 from mapspeak.safety import ApprovalScope
 from mapspeak.spatial.fieldofview import (
@@ -58,6 +59,10 @@ MOST_DRIVES = 4
 """To the goal, to where it fits after more of it is mapped, and the turn."""
 SCOPE_S = 600.0
 OCCUPIED = np.int8(100)
+SAME_M, SAME_RATIO = 1.0, 0.1
+"""Things of one label this near to each other, and by this share of their distance, are one."""
+NEARER_RATIO = 0.75
+"""From so much nearer a thing is worth telling again: it is placed better from there."""
 EXPLORING_LOOK = "a look while exploring,"
 
 
@@ -68,6 +73,48 @@ def is_view_due(robot: Pose, views: Sequence[CameraView]) -> bool:
     last = views[-1].pose
     is_apart = robot.point.distance_to(last.point) >= APART_M
     return is_apart or abs(wrap_angle(robot.yaw_rad - last.yaw_rad)) >= APART_RAD
+
+
+def find_untold(
+    pictures: Iterable[TakenPicture], on_the_way: Collection[str]
+) -> tuple[TakenPicture, ...]:
+    """Return the pictures taken on the way, with what the detector reports in them and no others.
+
+    A reader who is not shown them would else take for seen what only they show. Each thing is told
+    where it was nearest.
+
+    Args:
+        pictures: All of them; those not taken on the way since the last answer count as told.
+        on_the_way: Ids of those to tell.
+    """
+    untold, told = [], defaultdict[str, list[tuple[Point, float]]](list)
+    for picture in pictures:
+        for reading in picture.readings:
+            if picture.id in on_the_way:
+                untold.append((reading.range_m, picture, reading))
+            else:
+                told[reading.label].append((_place_of(picture, reading), reading.range_m))
+    kept = defaultdict[str, list[PictureReading]](list)
+    shown = {picture.id: picture for _, picture, _ in untold}
+    for range_m, picture, reading in sorted(untold, key=lambda each: each[0]):
+        place, known = _place_of(picture, reading), told[reading.label]
+        if all(
+            place.distance_to(other) > SAME_M + SAME_RATIO * other_m
+            or range_m < NEARER_RATIO * other_m
+            for other, other_m in known
+        ):
+            known.append((place, range_m))
+            kept[picture.id].append(reading)
+    return tuple(
+        replace(picture, readings=tuple(kept[picture_id]))
+        for picture_id, picture in shown.items()
+        if picture_id in kept
+    )
+
+
+def _place_of(picture: TakenPicture, reading: PictureReading) -> Point:
+    heading = picture.pose.yaw_rad + reading.bearing_rad
+    return point_ahead(picture.pose.point, heading, reading.range_m)
 
 
 def find_camera_target(

@@ -7,6 +7,7 @@ robot's detector (in the simulator: the *simulated detector*), filtered by the p
 import io
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -120,6 +121,8 @@ SIGHTING = re.compile(
     re.MULTILINE,
 )
 TAKEN = re.compile(r"taken at x (-?[\d.]+), y (-?[\d.]+), yaw (-?[\d.]+) deg")
+PASSED = re.compile(r"\w+ at x (-?[\d.]+), y (-?[\d.]+), yaw (-?[\d.]+) deg: (.+)")
+"""One of the pictures that an exploration took on the way."""
 CLEAR_RANGE_M = 6.0
 """Farther things are left to a waypoint that is nearer to them."""
 
@@ -136,6 +139,10 @@ class DetectedThing:
     range_m: float
 
 
+View = tuple[Pose, tuple[DetectedThing, ...]]
+"""Where a picture was taken, and what the detector reports in it."""
+
+
 def read_sightings(text: str) -> tuple[DetectedThing, ...]:
     """Read the detector's lines in the answer of `look_through_camera`, nearest first."""
     sightings = (
@@ -149,7 +156,7 @@ def read_sightings(text: str) -> tuple[DetectedThing, ...]:
     return tuple(sorted(sightings, key=lambda sighting: sighting.range_m))
 
 
-def describe_view(number: int, place: str, sightings: tuple[DetectedThing, ...]) -> dict[str, Any]:
+def describe_view(name: str, place: str, sightings: tuple[DetectedThing, ...]) -> dict[str, Any]:
     """Return the arguments of `write_semantic_data` for what is seen from here."""
     clear = [sighting for sighting in sightings if sighting.range_m <= CLEAR_RANGE_M]
     names = ", ".join(dict.fromkeys(sighting.label for sighting in clear))
@@ -158,7 +165,7 @@ def describe_view(number: int, place: str, sightings: tuple[DetectedThing, ...])
     for thing in clear:
         landmarks[any(word in thing.label for word in SAFETY_WORDS)].append(asdict(thing))
     return {
-        "name": f"view {number}",
+        "name": name,
         "description": f"View from {place}. {seen}",
         "safety_landmarks": landmarks[True],
         "functional_landmarks": landmarks[False],
@@ -252,22 +259,61 @@ class ToolDriver:
         """Return what the detector reports beside a picture, as far as this one sees."""
         return tuple(each for each in read_sightings(text) if each.range_m <= self.sight_m)
 
-    async def record(self, sightings: tuple[DetectedThing, ...], **taken_at: float) -> None:
-        """Remember under a number what is seen from here, or from x, y and yaw_deg."""
-        self._n_views += 1
-        place = (await self.tools.demand("get_robot_pose")).report["place"]
-        record = describe_view(self._n_views, place, sightings)
-        if not self.tells_ranges:
-            for thing in (*record["safety_landmarks"], *record["functional_landmarks"]):
-                del thing["range_m"]
-        await self.tools.demand("write_semantic_data", **record, **taken_at)
+    async def look_with(self, tool: str, **arguments: object) -> list[View]:
+        """Take pictures with a tool, and return what the detector reports in each."""
+        parts = TAKEN.split((await self.tools.call(tool, **arguments)).text)
+        numbers = zip(parts[1::4], parts[2::4], parts[3::4], strict=True)
+        return [
+            (_read_pose(of_pose), self.note(rest))
+            for of_pose, rest in zip(numbers, parts[4::4], strict=True)
+        ]
+
+    def read_passed(self, lines: Iterable[str]) -> list[View]:
+        """Return what the detector reports in pictures that were taken on the way."""
+        found = (PASSED.match(line) for line in lines)
+        return [
+            (_read_pose(match.groups()[:3]), self.note("- " + match[4].replace("; ", "\n- ")))
+            for match in found
+            if match is not None
+        ]
+
+    async def record(
+        self,
+        sightings: tuple[DetectedThing, ...],
+        *,
+        name: str = "view",
+        taken_at: Pose | None = None,
+    ) -> None:
+        """Remember what is seen from here, or from elsewhere, under a name and a number."""
+        if taken_at is not None:
+            place = await self.find_region(taken_at.point)
+        else:
+            place = (await self.tools.demand("get_robot_pose")).report["place"]
+        await self._record(sightings, place, name, taken_at)
 
     async def record_around(self) -> None:
         """Look to all sides, and remember what each picture shows."""
-        text = (await self.tools.demand("look_around")).text
-        for match, rest in zip(TAKEN.finditer(text), TAKEN.split(text)[4::4], strict=True):
-            x, y, yaw_deg = (float(part) for part in match.groups())
-            await self.record(self.note(rest), x=x, y=y, yaw_deg=yaw_deg)
+        views = await self.look_with("look_around")
+        place = (await self.tools.demand("get_robot_pose")).report["place"]
+        for pose, sightings in views:
+            await self._record(sightings, place, "view", pose)
+
+    async def _record(
+        self, sightings: tuple[DetectedThing, ...], place: str, name: str, taken_at: Pose | None
+    ) -> None:
+        self._n_views += 1
+        record = describe_view(f"{name} {self._n_views}", place, sightings)
+        if not self.tells_ranges:
+            for thing in (*record["safety_landmarks"], *record["functional_landmarks"]):
+                del thing["range_m"]
+        if taken_at is not None:
+            record |= {"x": taken_at.x, "y": taken_at.y, "yaw_deg": taken_at.yaw_deg}
+        await self.tools.demand("write_semantic_data", **record)
+
+
+def _read_pose(numbers: Iterable[str]) -> Pose:
+    x, y, yaw_deg = (float(number) for number in numbers)
+    return Pose(x, y, math.radians(yaw_deg))
 
 
 CUES = (

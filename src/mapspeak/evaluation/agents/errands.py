@@ -1,6 +1,7 @@
 """Composed errands of the scripted policy: parse them into a mission and run it."""
 
 import io
+import math
 import re
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -8,8 +9,9 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from mapspeak.evaluation.agent import AgentEnd, gave_up
-from mapspeak.evaluation.agents.driver import ToolDriver
-from mapspeak.geometry import Point
+from mapspeak.evaluation.agents.driver import DetectedThing, ToolDriver
+from mapspeak.geometry import Point, Pose
+from mapspeak.places.standing import point_ahead
 
 PLACE = re.compile(
     r"[Gg]o to the (?:space around \((?P<x>-?[\d.]+), (?P<y>-?[\d.]+)\)|nearest (?P<label>[^.]+?)) "
@@ -21,6 +23,9 @@ WITHIN_MIN = 50.0
 Search = Callable[[ToolDriver, str], Awaitable[AgentEnd]]
 MOST_WAITS = 150
 SPEAK_TRIES = 3
+MOST_TRIED = 3
+SAME_M = 2.5
+"""What is seen so near to where a thing was noted is that thing: one look places it roughly."""
 MOST_LOOKS = 3
 """A detector misses one thing in five."""
 DOCK = "nearest charging dock"
@@ -38,11 +43,10 @@ async def do_errand(driver: ToolDriver, errand: str, search: Search) -> AgentEnd
         is_charged = {"check": {"battery_above": float(low[1]) / 100}}
         steps.append({"fallback": [is_charged, charge]})
     for part in PLACE.finditer(errand):
-        label = part["label"]
-        if label is not None and not await driver.find_things(label):
-            await search(driver, label)
-            await _note_found(driver, label)
-        steps += await _go(driver, part, has_shut_door="door that is shut" in errand)
+        if part["label"] is not None:
+            steps.append({"drive": await _find(driver, part["label"], search)})
+        else:
+            steps += await _go(driver, part, has_shut_door="door that is shut" in errand)
         steps.append({"retry": SPEAK_TRIES, "do": [{"speak": part["words"]}]})
     tree = io.StringIO()
     YAML(typ="safe", pure=True).dump(steps, tree)
@@ -60,22 +64,63 @@ async def do_errand(driver: ToolDriver, errand: str, search: Search) -> AgentEnd
     return gave_up("The mission does not end.")
 
 
-async def _note_found(driver: ToolDriver, label: str) -> None:
-    """Remember what is seen beside a thing, once the detector reports the thing itself."""
-    seen = await driver.see()
-    for _ in range(MOST_LOOKS - 1):
-        if any(label in each.label for each in seen):
-            break
-        seen = await driver.see()
-    await driver.record(seen)
+async def _find(driver: ToolDriver, label: str, search: Search) -> str:
+    """Return the nearest thing that two looks have shown; search where none is to be seen."""
+    found = await _find_known(driver, label)
+    if found is None:
+        await search(driver, label)
+        found = await _find_known(driver, label)
+    return found or f"nearest {label}"
+
+
+async def _find_known(driver: ToolDriver, label: str) -> str | None:
+    """Return the nearest remembered thing that is there; look at one that one look has shown."""
+    for thing in (await driver.find_things(label))[:MOST_TRIED]:
+        if len(thing["seen_from"]) > 1 or thing["position"] is None:
+            return str(thing["id"])
+        at = Point(*thing["position"])
+        place = await _see_again(driver, label, thing["id"], near=at)
+        if place is not None and place.distance_to(at) <= SAME_M:
+            return await _find_at(driver, label, place)
+    return None
+
+
+async def _see_again(driver: ToolDriver, label: str, thing: str, *, near: Point) -> Point | None:
+    """Look at a thing until the detector reports it, at last to all sides.
+
+    Remember all of its kind that are seen, and return where the one is that is nearest to a point.
+    """
+    looks: list[tuple[str, dict[str, Any]]] = [
+        ("look_at", {"place": thing, "wait_s": driver.wait_s}),
+        *[("look_through_camera", {})] * (MOST_LOOKS - 1),
+        ("look_around", {}),
+    ]
+    for tool, look in looks:
+        places = []
+        for pose, sightings in await driver.look_with(tool, **look):
+            if seen := tuple(each for each in sightings if label in each.label):
+                await driver.record(seen, name=label, taken_at=pose)
+                places += [_place_of(pose, each) for each in seen]
+        if places:
+            return min(places, key=near.distance_to)
+    return None
+
+
+def _place_of(pose: Pose, seen: DetectedThing) -> Point:
+    return point_ahead(pose.point, pose.yaw_rad + math.radians(seen.bearing_deg), seen.range_m)
+
+
+async def _find_at(driver: ToolDriver, label: str, place: Point) -> str:
+    """Return the id of the remembered thing that lies nearest to a place."""
+    things = [each for each in await driver.find_things(label) if each["position"]]
+    things.sort(key=lambda each: Point(*each["position"]).distance_to(place))
+    return str(things[0]["id"]) if things else f"nearest {label}"
 
 
 async def _go(
     driver: ToolDriver, part: re.Match[str], *, has_shut_door: bool
 ) -> list[dict[str, Any]]:
-    """Return the steps to a place; where a door may be shut, by the door, which is opened first."""
-    if part["label"] is not None:
-        return [{"drive": f"nearest {part['label']}"}]
+    """Return the steps to a point; where a door may be shut, by the door, which is opened first."""
     point = Point(float(part["x"]), float(part["y"]))
     goal = {"drive": f"{point.x:.2f}, {point.y:.2f}"}
     if not has_shut_door:

@@ -34,7 +34,8 @@ COMPASS_DEG = {"east": 0.0, "north": 90.0, "west": 180.0, "south": -90.0}
 ASIDE_M = (1.2, 2.0, 3.0)
 MOST_ASIDE = 3
 MOST_TRIED = 3
-MOST_STEPS = 120
+MOST_LOOKS = 120
+"""In one search: it looks on until all is seen."""
 SEARCH = "search_for"
 
 Deed = Callable[[ToolDriver, re.Match[str]], Awaitable[AgentEnd]]
@@ -95,6 +96,8 @@ async def _explore(driver: ToolDriver, _match: re.Match[str]) -> AgentEnd:
         )
         if answer.pictures:
             await driver.record(driver.note(answer.text))
+        for pose, sightings in driver.read_passed(answer.report["on_the_way"]):
+            await driver.record(sightings, taken_at=pose)
         state = answer.report["state"]
         if state not in ("driving", "at_goal"):
             break
@@ -166,25 +169,27 @@ async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
 
 async def _is_there(driver: ToolDriver, thing: str, label: str) -> bool:
     """Look at a remembered thing from where it should be in view."""
-    look = await driver.tools.call("look_at", place=thing, wait_s=driver.wait_s)
-    return any(label in sighting.label for sighting in driver.note(look.text))
+    views = await driver.look_with("look_at", place=thing, wait_s=driver.wait_s)
+    return any(label in sighting.label for _, sightings in views for sighting in sightings)
 
 
 async def _search(driver: ToolDriver, label: str) -> AgentEnd:
     """Let the robot look about until the detector reports the thing, and goes there."""
     if not await driver.is_offered(SEARCH):
         return gave_up(f"I know no way to a {label}, and am offered no search.")
-    answer = await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
-    for _ in range(MOST_STEPS):
+    bounds = {"thing": label, "max_looks": MOST_LOOKS, "wait_s": WAIT_S}
+    answer = await driver.tools.call(SEARCH, **bounds)
+    for _ in range(MOST_LOOKS):
         if answer.is_error:
             return gave_up(answer.text)
         found = [each for each in driver.note(answer.text) if label in each.label]
         if found:
+            await driver.record(tuple(found), name=label)
             return await _approach(driver, label, found[0].bearing_deg, found[0].range_m)
         if answer.report["state"] not in ("driving", "look", "reported"):
             return gave_up(f"There is no {label} to be found: {answer.report['reason']}")
         more = {} if answer.report["state"] == "driving" else {"seen": False}
-        answer = await driver.tools.call(SEARCH, thing=label, **more, wait_s=WAIT_S)
+        answer = await driver.tools.call(SEARCH, **bounds, **more)
     return gave_up(f"I have looked long enough for a {label}.")
 
 

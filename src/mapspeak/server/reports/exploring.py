@@ -1,5 +1,6 @@
 """What the model reads while the robot explores, searches or follows a route."""
 
+import math
 from collections.abc import Sequence
 from typing import Self
 
@@ -9,9 +10,10 @@ from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, P
 from mapspeak.driving.routes.following import RouteProgress, RouteState
 from mapspeak.driving.routes.planning import RoutePlan, RouteStop, StopState
 from mapspeak.driving.search.progress import SearchProgress, SearchState, SeenRegion
+from mapspeak.memory import TakenPicture
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import say_pose_doubt
+from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.text.world.drives import (
     say_blocked,
     say_candidate,
@@ -95,11 +97,15 @@ class ExploreAnswer(Report):
     robot: PoseReport
     pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
     cannot_reach: list[str] = Field(description="what was blocked or is left, where, and why")
+    on_the_way: list[str] = Field(
+        description="in pictures taken on the way, which count but are not shown: what the "
+        "detector reports there alone (bearing, left positive; range)"
+    )
     next_step: str
 
     @classmethod
-    def of(cls, progress: Progress) -> Self:
-        """Make the report of an exploration."""
+    def of(cls, progress: Progress, on_the_way: Sequence[TakenPicture] = ()) -> Self:
+        """Make the report of an exploration, and of what was seen on the way since the last."""
         trip = progress.trip
         return cls(
             state=progress.state,
@@ -121,6 +127,7 @@ class ExploreAnswer(Report):
             robot=PoseReport.of(progress.pose),
             pose_uncertain=say_pose_doubt(progress.pose_doubt),
             cannot_reach=_say_rest(progress),
+            on_the_way=[_say_readings(each) for each in on_the_way],
             next_step=lead(_find_next_step(progress)),
         )
 
@@ -156,6 +163,15 @@ def _say_rest(progress: Progress) -> list[str]:
     ]
     left_out = len(told) - MOST_NAMED
     return told if left_out <= 0 else [*told[:MOST_NAMED], f"and {left_out} more"]
+
+
+def _say_readings(picture: TakenPicture) -> str:
+    """Say where a picture was taken, and what is reported in it."""
+    things = (
+        f"{each.label}, {math.degrees(each.bearing_rad):+.0f} deg, {each.range_m:.1f} m"
+        for each in picture.readings
+    )
+    return f"{picture.id} at {say_pose(picture.pose)}: {'; '.join(things)}"
 
 
 def _say_seen(regions: Sequence[SeenRegion]) -> list[str]:

@@ -10,6 +10,7 @@ from mcp.server.mcpserver import Context
 from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
+from mapspeak.driving.exploration.camera import find_untold
 from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import Bounds, ExplorationState
 from mapspeak.driving.search.evidence import leave_out_shown
@@ -92,7 +93,8 @@ class ExploreTools:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._explorer = Explorer(session, look=partial(look_ahead, session))
+        self._explorer = Explorer(session, look=self._look_on_the_way)
+        self._on_the_way: set[str] = set()
         self._searcher = Searcher(session)
 
     @tool(
@@ -134,7 +136,11 @@ class ExploreTools:
             stops_at_goals and progress.state is ExplorationState.BOUND_REACHED
         )
         sighting = await self._look_if_it_can() if sees else None
-        return _answer(ExploreAnswer.of(progress), sighting)
+        untold = await self._session.compute(
+            partial(find_untold, self._session.pictures.taken, frozenset(self._on_the_way))
+        )
+        self._on_the_way.clear()
+        return _answer(ExploreAnswer.of(progress, untold), sighting)
 
     @tool("Find a thing", ToolEffect.MOVES, has_report=True)
     async def search_for(
@@ -173,6 +179,12 @@ class ExploreTools:
         self._searcher.note_picture(sighting.picture)
         shown = dataclasses.replace(standing, n_looks=standing.n_looks + 1)
         return _answer(SearchAnswer.of(shown), sighting)
+
+    async def _look_on_the_way(self) -> None:
+        """Take a picture that is not shown, and tell in the next answer what is reported in it."""
+        await look_ahead(self._session)
+        if (taken := self._session.pictures.latest) is not None:
+            self._on_the_way.add(taken.id)
 
     def _find_earlier(self, thing: str) -> tuple[TakenPicture, ...]:
         taken = self._session.pictures.taken
