@@ -14,7 +14,7 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState
 from mapspeak.spatial import OccupancyGrid
-from served import connect, report_of
+from served import connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio
 
@@ -169,6 +169,21 @@ async def test_a_stop_during_the_turn_on_arrival_ends_it(tmp_path: Path) -> None
             told = report_of(await client.call_tool("wait_for_goal", {}))
     assert told["state"] == "arrived"
     assert len(robot.goals) == 1
+
+
+@pytest.mark.parametrize(
+    ("tool", "arguments"), [("look_around", {"n_pictures": 2}), ("turn", {"by_deg": 90})]
+)
+async def test_turning_while_a_drive_runs_stops_first_and_says_what_it_ended(
+    tmp_path: Path, tool: str, arguments: dict[str, int]
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("drive",)) as client:
+        sent = await drive(client, x=6.0, y=1.5, wait_s=0)
+        answer = await client.call_tool(tool, arguments)
+        told = report_of(await client.call_tool("wait_for_goal", {"goal_id": "G1"}))
+    assert sent["state"] in ("accepted", "driving")
+    assert "G1 to (6.00, 1.50) was ended first" in text_of(answer)
+    assert told["state"] == "cancelled"
 
 
 def _point(report: dict[str, Any]) -> tuple[float, float]:

@@ -228,11 +228,14 @@ class ViewTools:
                 "A turn is either by an angle or to a heading.",
                 hint="Give by_deg (left positive), or to_yaw_deg.",
             )
+        ended = await self._end_drive()
         yaw_rad = math.radians(to_yaw_deg or 0.0)
         if by_deg is not None:
             here = (await self._session.robot.fetch_pose()).pose
             yaw_rad = here.yaw_rad + math.radians(by_deg)
-        return DriveAnswer.of(await self._turn(context, yaw_rad, LONGEST_WAIT_S))
+        answer = DriveAnswer.of(await self._turn(context, yaw_rad, LONGEST_WAIT_S))
+        reason = " ".join(filter(None, (*ended, answer.reason)))
+        return answer.model_copy(update={"reason": reason})
 
     @tool("Look all around", ToolEffect.MOVES)
     async def look_around(
@@ -244,12 +247,13 @@ class ViewTools:
         """
         robot = self._session.robot
         deadline_s = robot.now_s + LONGEST_WAIT_S
+        ended = await self._end_drive()
         first = await look_ahead(self._session, camera)
         here = (await robot.fetch_pose()).pose
         n_pictures = n_pictures or _count_all_around(first.picture)
         what = f"turn in place for {n_pictures} pictures"
         scope = ApprovalScope(what=what, n_drives=n_pictures - 1, duration_s=LONGEST_WAIT_S)
-        shown: list[str | Image] = [first.text, first.image]
+        shown: list[str | Image] = ["\n".join((*ended, first.text)), first.image]
         for yaw_rad in spread_headings(here.yaw_rad, n_pictures)[1:]:
             left_s = deadline_s - robot.now_s
             if left_s < LEAST_TURN_S:
@@ -266,6 +270,20 @@ class ViewTools:
                 return [*shown, _say_rest(yaw_rad, say_error(error))]
             shown += [sighting.text, sighting.image]
         return shown
+
+    async def _end_drive(self) -> list[str]:
+        """End the client's own drive under way, so that the robot stands; say which it was."""
+        drives = self._session.drives
+        drive = drives.under_way
+        if drive is None or drive.caller.owner != current_caller().owner:
+            return []
+        report = await drives.report(drive.goal_id)
+        if report.status.state.is_final:
+            return []
+        report = (await drives.cancel(drive.goal_id)).as_asked
+        left_m = report.pose.point.distance_to(report.drive.goal.point)
+        told = f"{report.drive.goal_id} to {report.drive.place} was ended first"
+        return [f"{told}, {left_m:.1f} m before it got there."]
 
     async def _turn(
         self, context: Context, yaw_rad: float, wait_s: float, what: str = TURN
