@@ -49,6 +49,9 @@ CELL_BEFORE_UNKNOWN = grid_from_text(
 )
 
 
+LEG_S = 0.5
+
+
 async def drive(client: Client, **arguments: str | float) -> dict[str, Any]:
     return report_of(await client.call_tool("navigate_to", arguments))
 
@@ -121,10 +124,14 @@ async def test_a_goal_that_proves_too_tight_is_moved_to_where_the_robot_fits(
     robot = FakeRobot(CORRIDOR)
     async with connect(robot, tmp_path) as client:
         sent = await drive(client, place="C1", wait_s=0)
+        await robot.sleep(LEG_S)
         robot.grid = _with_post_at_goal(sent)
         robot.end_goal(GoalState.BLOCKED)
         told = report_of(await client.call_tool("wait_for_goal", {}))
-    assert told["state"] == "arrived"
+        again = report_of(await client.call_tool("wait_for_goal", {"goal_id": sent["goal_id"]}))
+    for each in (told, again):
+        assert (each["goal_id"], each["state"]) == (sent["goal_id"], "arrived")
+        assert each["elapsed_s"] >= LEG_S
     assert told["place"] == "C1"
     at = told["robot"]["x"], told["robot"]["y"]
     assert 0.2 <= math.dist(at, _point(sent)) <= 1.0

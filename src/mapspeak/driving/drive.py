@@ -16,7 +16,13 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.driving.drivemonitor import NEEDS_NO_STOP, PATIENCE_S, DriveMonitor, Look, OwedStop
-from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, refuse_beside
+from mapspeak.driving.drivereport import (
+    JUST_SENT,
+    Drive,
+    DriveReport,
+    find_drive,
+    refuse_beside,
+)
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.relations.choosing import GoalPurpose
@@ -166,7 +172,7 @@ class DriveBook:
         """
         if goal_id is None and not self._drives:
             await self._check_foreign_goals()
-        drive = self._find(goal_id)
+        drive = find_drive(self._drives, goal_id)
         look = await self._monitor.look(drive, within_s=within_s)
         drive = self._drives.get(drive.goal_id, drive)
         if drive.final is None:
@@ -190,7 +196,7 @@ class DriveBook:
 
         Cancelling the wait cancels the drive and stops the robot.
         """
-        goal_id = self._find(goal_id).goal_id if self._drives else goal_id
+        goal_id = find_drive(self._drives, goal_id).goal_id if self._drives else goal_id
         try:
             return await self._wait(goal_id, wait_s, on_progress)
         except anyio.get_cancelled_exc_class():
@@ -370,21 +376,6 @@ class DriveBook:
                 hint="Wait for its end, or end it.",
                 step=NextStep.WAIT_OR_STOP,
             )
-
-    def _find(self, goal_id: str | None) -> Drive:
-        drive = self.latest if goal_id is None else self._drives.get(goal_id.strip().upper())
-        if drive is not None:
-            return drive
-        if not self._drives:
-            raise GoalError(
-                "The robot was sent nowhere yet.",
-                hint="Send it somewhere first.",
-                step=NextStep.DRIVE_FIRST,
-            )
-        raise GoalError(
-            f"There is no goal {str(goal_id)[:40]!r}.",
-            hint=f"Known goals are {', '.join(list(self._drives)[-5:])}.",
-        )
 
     def _end(self, drive: Drive, status: GoalStatus) -> None:
         """Note how a drive ended; the first word counts."""

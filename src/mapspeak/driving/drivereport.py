@@ -1,7 +1,7 @@
 """A drive that was sent to the robot, and how it stands."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
@@ -80,9 +80,47 @@ class DriveReport:
         asked, drive = self.drive.part_of, self.drive
         if asked is None:
             return self
-        told = replace(drive, goal_id=asked.goal_id, place=asked.place, purpose=asked.purpose)
+        told = replace(
+            drive,
+            goal_id=asked.goal_id,
+            place=asked.place,
+            purpose=asked.purpose,
+            started_s=asked.started_s,
+            part_of=asked.part_of,
+        )
         before_s = drive.started_s - asked.started_s
         return replace(self, drive=told, elapsed_s=self.elapsed_s + max(before_s, 0.0))
+
+
+def find_drive(drives: Mapping[str, Drive], goal_id: str | None) -> Drive:
+    """Return a drive, or the one that goes on for it where it did not get there.
+
+    Args:
+        drives: By their ids, the oldest first.
+        goal_id: None for the latest.
+
+    Raises:
+        GoalError: No drive has that id.
+    """
+    latest = next(reversed(drives.values()), None)
+    drive = latest if goal_id is None else drives.get(goal_id.strip().upper())
+    if drive is None and not drives:
+        raise GoalError(
+            "The robot was sent nowhere yet.",
+            hint="Send it somewhere first.",
+            step=NextStep.DRIVE_FIRST,
+        )
+    if drive is None:
+        raise GoalError(
+            f"There is no goal {str(goal_id)[:40]!r}.",
+            hint=f"Known goals are {', '.join(list(drives)[-5:])}.",
+        )
+    if drive.final is None or drive.final.state is GoalState.ARRIVED:
+        return drive
+    parts = [
+        each for each in drives.values() if each.part_of and each.part_of.goal_id == drive.goal_id
+    ]
+    return parts[-1] if parts else drive
 
 
 def refuse_beside(busy: Drive) -> NoReturn:

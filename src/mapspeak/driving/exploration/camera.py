@@ -274,7 +274,7 @@ async def end_for_picture(
     """
     drive, state = report.drive, report.status.state
     latest = site.drives.latest
-    is_latest = latest is not None and latest.goal_id == drive.goal_id
+    is_latest = latest is not None and _is_last_drive_of(drive, latest)
     if not drive.purpose.is_for_picture or not is_latest:
         return report
     try:
@@ -286,6 +286,12 @@ async def end_for_picture(
         # The robot was stopped or another client drives it: how this drive ended stays true.
         return report
     return report
+
+
+def _is_last_drive_of(drive: Drive, latest: Drive) -> bool:
+    """Return True when a drive is the latest, or another one that goes on with it, but no turn."""
+    asked = latest.part_of or latest
+    return asked.goal_id == drive.goal_id and latest.purpose.is_for_picture
 
 
 def _choose_face(drive: Drive) -> Face:
@@ -304,9 +310,10 @@ async def _drive_nearby(
     pose = Pose(point.x, point.y, drive.goal.yaw_rad)
     pose = await site.compute(partial(_choose_face(drive), world, pose, views))
     nearby = await site.drives.start(
-        pose, place=drive.place, ticket=drive.ticket, purpose=drive.purpose
+        pose, place=drive.place, ticket=drive.ticket, purpose=drive.purpose, part_of=drive
     )
-    return await site.drives.wait(nearby.goal_id, wait_s=wait_s, on_progress=on_progress)
+    ended = await site.drives.wait(nearby.goal_id, wait_s=wait_s, on_progress=on_progress)
+    return ended.as_asked
 
 
 async def _turn_to_new_walls(

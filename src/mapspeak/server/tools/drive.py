@@ -165,7 +165,8 @@ class DriveTools:
         robot, on_progress = self._session.robot, tell_progress(context)
         until_s = robot.now_s + wait_s
         report = await self._session.drives.wait(goal_id, wait_s=wait_s, on_progress=on_progress)
-        report = report if goal_id else report.as_asked
+        if goal_id is None or goal_id.strip().upper() != report.drive.goal_id:
+            report = report.as_asked
         drive = report.drive
         if wait_s > 0 and drive.caller.owner == current_caller().owner:
             left_s = max(until_s - robot.now_s, 0.0)
