@@ -102,7 +102,7 @@ def find_drive(drives: Mapping[str, Drive], goal_id: str | None) -> Drive:
     Raises:
         GoalError: No drive has that id.
     """
-    latest = next(reversed(drives.values()), None)
+    latest = next(reversed(list(drives.values())), None)
     drive = latest if goal_id is None else drives.get(goal_id.strip().upper())
     if drive is None and not drives:
         raise GoalError(

@@ -142,6 +142,22 @@ async def test_two_pictures_from_one_spot_give_bearings_from_one_pose(tmp_path: 
     assert tap.picture is None
 
 
+async def test_a_place_faces_what_its_safety_things_were_seen_in(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await look(client)
+        await robot.sleep(1.0)
+        robot.pose = Pose(START.x, START.y, math.pi / 2)
+        await look(client)
+        landmarks = {
+            "safety_landmarks": [{"label": "fire extinguisher", "picture": "P1", "bearing_deg": 7}],
+            "functional_landmarks": [{"label": "tap", "picture": "P2", "bearing_deg": 3}],
+        }
+        given = {"name": "a", "description": ""} | landmarks
+        await client.call_tool("write_semantic_data", given)
+    assert stored(tmp_path).pose == START
+
+
 async def test_what_was_seen_in_a_picture_from_elsewhere_keeps_its_pose(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path) as client:

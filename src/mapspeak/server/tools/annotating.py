@@ -1,6 +1,7 @@
 """The arguments of `write_semantic_data`, sorted into accepted and refused things."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -89,13 +90,21 @@ class Annotator:
     laser: LaserRing | None = None
     refused: list[str] = field(default_factory=list)
 
-    def find_origin(self, *given: Landmarks | None) -> TakenPicture | None:
-        """Return the last picture that they were seen in; None where one was seen from here."""
-        seen = [(thing, self._find_picture(thing)) for thing in _things(given)]
+    def find_origin(
+        self, safety: Landmarks | None, functional: Landmarks | None
+    ) -> TakenPicture | None:
+        """Return the picture of most safety things, then of most, then the last.
+
+        None where one thing was seen from here.
+        """
+        seen = [(thing, self._find_picture(thing)) for thing in _things((safety, functional))]
         if any(thing.bearing_deg is not None and picture is None for thing, picture in seen):
             return None
-        taken = [picture for _, picture in seen if picture is not None]
-        return max(taken, key=lambda picture: picture.stamp_s, default=None)
+        n_safety = Counter(filter(None, map(self._find_picture, _things([safety]))))
+        n_all = Counter(picture for _, picture in seen if picture is not None)
+        return max(
+            n_all, key=lambda each: (n_safety[each], n_all[each], each.stamp_s), default=None
+        )
 
     def find_picture_from(self, pose: Pose) -> TakenPicture | None:
         """Return the picture that was taken last, if it shows what is seen from a pose."""

@@ -50,7 +50,12 @@ X = Annotated[
     Field(description="metres; else the picture's or robot's", allow_inf_nan=False),
 ]
 Y = Annotated[float | None, Field(description="metres", allow_inf_nan=False)]
-Degrees = Annotated[float | None, Field(description="degrees", allow_inf_nan=False)]
+Degrees = Annotated[
+    float | None,
+    Field(
+        description="else as in the picture of most safety things, or of most", allow_inf_nan=False
+    ),
+]
 Query = Annotated[str | None, Field(description="or by what is there", max_length=200)]
 FromRow = Annotated[int, Field(description="row", ge=0)]
 WaypointName = Annotated[str | None, Field(description="one; else all")]
