@@ -10,7 +10,14 @@ from itertools import islice
 
 from mapspeak.geometry import Point
 from mapspeak.memory import Waypoint
-from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKind, Verdict
+from mapspeak.memory.search.answer import (
+    Answer,
+    Basis,
+    EntryCandidate,
+    EntryKind,
+    MatchField,
+    Verdict,
+)
 from mapspeak.places.candidate import (
     RecallCandidate,
     RecallDoubt,
@@ -111,6 +118,23 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
         is_empty=not (world.recollection.places or world.things),
         doubt=find_doubt(candidates[0], room_id=query.room_id) if is_found else None,
     )
+
+
+BESIDE = (MatchField.DESCRIPTION, MatchField.PLACE)
+
+
+def leave_out_beside(recalled: Recall) -> Recall:
+    """Return an answer that surely names something without what only stands beside such a thing."""
+    answer = recalled.answer
+    if not answer.is_sure:
+        return recalled
+    meant = {each.entry.id for each in answer.candidates[: answer.n_meant]}
+    kept = tuple(
+        each
+        for each in recalled.candidates
+        if each.id in meant or each.match is None or each.match.field not in BESIDE
+    )
+    return replace(recalled, candidates=kept)
 
 
 def _find_passing(world: WorldModel, query: RecallQuery) -> Mapping[str, Remembered]:

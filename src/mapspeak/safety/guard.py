@@ -83,11 +83,15 @@ class MapReviser:
             return self._latest
 
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
-        """Return events in words, and which rules are about regions that are not on the map."""
+        """Return events in words, and which rules are about regions that are not on the map.
+
+        Mere notes of a place are told where that is asked about.
+        """
         events, now = self._read_events(), self._wall_clock()
+        told = (each for each in events if each.effect is not Effect.NONE or not each.place)
         return (
             *self._say_off(revision),
-            *say_events(events, now),
+            *say_events(told, now),
             *say_unplaced(events, revision, now),
         )
 

@@ -109,6 +109,39 @@ async def test_check_memory_lists_the_least_trusted_first(tmp_path: Path, mode: 
     assert text.count('"sink" of "far": it is told as 9.0 m away, behind a wall') == 1
 
 
+async def test_only_notes_that_have_to_do_with_a_question_are_told(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path)
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        for text, place, effect in (
+            ("kitchen with a sink", "R1", "none"),
+            ("store with crates", "R2", "none"),
+            ("painters at work", "7, 1.5", "closed"),
+        ):
+            await client.call_tool("note_event", {"text": text, "place": place, "effect": effect})
+        found = text_of(await client.call_tool("find_place", {"query": "kitchen"}))
+        room = text_of(await client.call_tool("describe_place", {"place": "R1"}))
+        shown = text_of(await client.call_tool("look_at_map", {}))
+    assert 'Noted: E1 "kitchen with a sink"' in found
+    assert "E2" not in found
+    assert "painters" not in found
+    assert 'Noted: E1 "kitchen with a sink"' in room
+    assert "crates" not in room
+    assert "painters" in shown
+    assert "crates" not in shown
+
+
+async def test_beside_a_clear_answer_what_only_stands_near_such_a_thing_is_left_out(
+    tmp_path: Path,
+) -> None:
+    north = seen("a", 4.5, 0.6) | {"description": "A fire extinguisher hangs by the door."}
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await remember(client, north, seen("b", 5.5, 2.2), record("c", 1.0, 1.0, "fire hose reel"))
+        found = report_of(await client.call_tool("find_place", {"query": "fire extinguisher"}))
+    names = [each["name"] for each in found["candidates"]]
+    assert names == ["fire extinguisher", "fire hose reel"]
+
+
 async def test_of_things_of_little_trust_it_is_said_why(tmp_path: Path) -> None:
     behind = {"bearing_deg": 90, "range_m": 9.0, "confidence": "unsure"}
     far = record("far", 2.0, 1.0, "fire extinguisher", **behind)

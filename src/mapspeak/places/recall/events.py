@@ -9,7 +9,7 @@ import numpy as np
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory import LEFT_OUT, Concern, MemoryStore
+from mapspeak.memory import LEFT_OUT, Concern, MemoryStore, name_key
 from mapspeak.memory.events import (
     Effect,
     Event,
@@ -19,6 +19,7 @@ from mapspeak.memory.events import (
     gives_orders,
     show_local,
 )
+from mapspeak.memory.search.wordindex import content_stems
 from mapspeak.places.naming import Place, Spot, Thing
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.spatial.rooms import Door, Region, RoomMap
@@ -205,6 +206,48 @@ def find_also_closed(revision: MapRevision, event: Event, now: datetime) -> list
     inside = mask_areas(revision.grid, [area])
     others = (each for each in revision.areas if each.event_id != event.id)
     return [each for each in others if (inside & mask_areas(revision.grid, [each])).any()]
+
+
+def find_speaking_events(events: Iterable[Event], words: str, now: datetime) -> tuple[Event, ...]:
+    """Return the events that last, or are still to come, and say words of a request.
+
+    Those that say most of them come first.
+    """
+    wanted = set(content_stems(words))
+    n_said = {
+        event: len(wanted.intersection(content_stems(f"{event.text} {event.place}")))
+        for event in events
+        if not event.is_over(now)
+    }
+    return tuple(sorted(filter(n_said.get, n_said), key=lambda each: -n_said[each]))
+
+
+def find_events_at(
+    events: Iterable[Event], world: WorldModel, place: Place, now: datetime
+) -> tuple[Event, ...]:
+    """Return the events that last, or are still to come, of a place: of a room all in it."""
+    thing = place.thing
+    place_id = "" if isinstance(thing, Spot) else thing.id
+
+    def is_of_it(event: Event) -> bool:
+        if isinstance(thing, Region) and event.at is not None:
+            return world.find_room_id(event.at) == place_id
+        return place_id in find_place_ids(event.place) or name_key(event.place) == name_key(
+            place.name
+        )
+
+    return tuple(each for each in events if not each.is_over(now) and is_of_it(each))
+
+
+def leave_out_events(
+    warnings: Iterable[str], events: Iterable[Event], revision: MapRevision, now: datetime | None
+) -> list[str]:
+    """Return those of a map's warnings that are of no event."""
+    if now is None:
+        return list(warnings)
+    kept = tuple(events)
+    of_events = {*say_events(kept, now), *say_unplaced(kept, revision, now)}
+    return [each for each in warnings if each not in of_events]
 
 
 def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:

@@ -8,7 +8,13 @@ from pydantic import Field
 from mapspeak.driving.drivereport import find_failed
 from mapspeak.errors import GoalError
 from mapspeak.memory.search.answer import EntryKind
-from mapspeak.places.asking import RecallQuery, recall
+from mapspeak.places.asking import RecallQuery, leave_out_beside, recall
+from mapspeak.places.recall.events import (
+    find_events_at,
+    find_speaking_events,
+    leave_out_events,
+    say_events,
+)
 from mapspeak.places.relations.choosing import check_place, find_place, name_room
 from mapspeak.places.things import split_room
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
@@ -62,8 +68,17 @@ class PlaceTools:
 
         Use it for shape, doors along a corridor, what was seen there, how to get there.
         """
-        world = await self._session.fetch_world_model()
-        return await self._session.compute(lambda: describe_place(world, find_place(world, place)))
+        session = self._session
+        world, now = await session.fetch_world_model(), session.find_wall_time()
+
+        def describe() -> str:
+            found, noted = find_place(world, place), ()
+            if now is not None:
+                events = find_events_at(session.recall_events(), world, found, now)
+                noted = say_events(events, now)
+            return describe_place(world, found, noted=noted)
+
+        return await session.compute(describe)
 
     @tool("Measure ways and sizes", ToolEffect.READS)
     async def measure(self, places: Places = None, start: Start = "robot") -> str:
@@ -156,9 +171,13 @@ class FindTools:
                 kind=kind,
                 n=k,
             )
-            answer = recall(world, wanted)
+            answer = leave_out_beside(recall(world, wanted))
+            events, warned = session.recall_events(), world.memory.warnings
+            others = leave_out_events(warned, events, world.map, now)
+            speaking = () if now is None else find_speaking_events(events, query, now)
+            noted = [f"Noted: {each.sentence(now)}" for each in speaking if now is not None]
             report = RecallAnswer.of(
-                answer, now=now, warnings=(*world.memory.warnings, *say_elsewhere(world.memory))
+                answer, now=now, warnings=(*noted, *others, *say_elsewhere(world.memory))
             )
             if now is None:
                 return report

@@ -154,8 +154,12 @@ NEAR_M = 5.0
 MOST_NEAR = 6
 
 
-def describe_place(world: WorldModel, place: Place) -> str:
-    """Return all that is known of a place, a fact on each line."""
+def describe_place(world: WorldModel, place: Place, *, noted: Sequence[str] = ()) -> str:
+    """Return all that is known of a place, a fact on each line.
+
+    Args:
+        noted: The events there, in words.
+    """
     goal = check_place(world, place)
     match place.thing:
         case Region() as region:
@@ -172,7 +176,8 @@ def describe_place(world: WorldModel, place: Place) -> str:
             lines = _spot_lines(world, place)
     is_told = isinstance(place.thing, RememberedThing) and place.name == place.thing.id
     why = [f"{place.name} is {place.reason}."] if place.reason and not is_told else []
-    return "\n".join([*why, *lines, *_way_lines(world, place, goal)])
+    of_events = (f"Noted: {each}" for each in noted)
+    return "\n".join([*why, *lines, *of_events, *_way_lines(world, place, goal)])
 
 
 def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[str]:

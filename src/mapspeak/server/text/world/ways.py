@@ -12,7 +12,7 @@ from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
-from mapspeak.places.recall.events import say_events, say_unplaced
+from mapspeak.places.recall.events import leave_out_events, say_events, say_unplaced
 from mapspeak.places.relations.choosing import check_place, find_place, find_places
 from mapspeak.places.standing import find_standing_point
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
@@ -76,12 +76,9 @@ def describe_blocked(
 
 def _say_doubts(world: WorldModel, events: Sequence[Event], now: datetime | None) -> Iterator[str]:
     """Say why not all that is in the way may be known: the warnings that are of no event."""
-    of_events: set[str] = set()
-    if now is not None:
-        of_events = {*say_events(events, now), *say_unplaced(events, world.map, now)}
-    for warning in say_warnings(world):
-        if warning.removeprefix("Warning: ") not in of_events:
-            yield warning
+    told = (each.removeprefix("Warning: ") for each in say_warnings(world))
+    for warning in leave_out_events(told, events, world.map, now):
+        yield f"Warning: {warning}"
 
 
 def _section(what: str, lines: Sequence[str]) -> str:
