@@ -225,7 +225,7 @@ class RecallAnswer(Report):
     def text(self) -> str:
         """The answer in lines: what to do, a line for each candidate, why the first is trusted.
 
-        Of the others it is said why one is not.
+        Of others that fit as well it is said why one is not.
         """
         fitting = f"{self.n_fitting} fit{'s' * (self.n_fitting == 1)} {quote(self.understood)} best"
         heading = f"{len(self.candidates)} of {self.n_searched}, the likeliest first; {fitting}"
@@ -233,10 +233,14 @@ class RecallAnswer(Report):
         # What is probably not meant is named in the advice; a table of such things would mislead.
         if self.candidates and self.verdict is not Verdict.NOT_REMEMBERED:
             lines.append(build_table(heading, COLUMNS, self.candidates, lambda each: each.row))
+            first, *others = self.candidates
+            doubtful = [
+                each for each in others[: self.n_fitting - 1] if each.trust < DOUBTFUL_RATIO
+            ]
             lines += [
                 f"Trust in {each.id}: {' '.join(each.trust_why)}"
-                for number, each in enumerate(self.candidates)
-                if each.trust_why and (not number or each.trust < DOUBTFUL_RATIO)
+                for each in (first, *doubtful)
+                if each.trust_why
             ]
         return "\n".join([*lines, *self.warnings])
 

@@ -72,7 +72,8 @@ class PlaceTools:
         world, now = await session.fetch_world_model(), session.find_wall_time()
 
         def describe() -> str:
-            found, noted = find_place(world, place), ()
+            found = find_place(world, place)
+            noted: tuple[str, ...] = ()
             if now is not None:
                 events = find_events_at(session.recall_events(), world, found, now)
                 noted = say_events(events, now)
