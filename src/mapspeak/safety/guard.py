@@ -38,6 +38,11 @@ from mapspeak.worldmodel.revision import MapRevision
 logger = logging.getLogger(__name__)
 
 
+def _is_note_of_place(event: Event) -> bool:
+    has_time = event.begins is not None or event.until is not None
+    return event.effect is Effect.NONE and bool(event.place) and not has_time
+
+
 class MapReviser:
     """Makes the revisions of a robot's map.
 
@@ -85,10 +90,10 @@ class MapReviser:
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
         """Return events in words, and which rules are about regions that are not on the map.
 
-        Mere notes of a place are told where that is asked about.
+        Mere notes of a place, for good, are told where that is asked about.
         """
         events, now = self._read_events(), self._wall_clock()
-        told = (each for each in events if each.effect is not Effect.NONE or not each.place)
+        told = (each for each in events if not _is_note_of_place(each))
         return (
             *self._say_off(revision),
             *say_events(told, now),
