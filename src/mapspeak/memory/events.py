@@ -160,6 +160,12 @@ class Event:
         is_in_its_words = self.text in (SHUT, OPEN_AGAIN) and self.effect is Effect.AVOID
         return self.source == ROBOT and is_in_its_words
 
+    @property
+    def is_note_of_place(self) -> bool:
+        """True for what is so at a place for good and changes no way."""
+        has_time = self.begins is not None or self.until is not None
+        return self.effect is Effect.NONE and bool(self.place) and not has_time
+
     def is_current(self, now: datetime) -> bool:
         """Return True while it lasts; `now` has a zone."""
         begins, until = self.find_time(now)

@@ -38,11 +38,6 @@ from mapspeak.worldmodel.revision import MapRevision
 logger = logging.getLogger(__name__)
 
 
-def _is_note_of_place(event: Event) -> bool:
-    has_time = event.begins is not None or event.until is not None
-    return event.effect is Effect.NONE and bool(event.place) and not has_time
-
-
 class MapReviser:
     """Makes the revisions of a robot's map.
 
@@ -88,12 +83,9 @@ class MapReviser:
             return self._latest
 
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
-        """Return events in words, and which rules are about regions that are not on the map.
-
-        Mere notes of a place, for good, are told where that is asked about.
-        """
+        """Return events in words, but notes of a place, and which rules are of no region here."""
         events, now = self._read_events(), self._wall_clock()
-        told = (each for each in events if not _is_note_of_place(each))
+        told = (each for each in events if not each.is_note_of_place)
         return (
             *self._say_off(revision),
             *say_events(told, now),

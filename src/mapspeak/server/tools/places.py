@@ -1,5 +1,6 @@
 """The tools that find places and answer about them: remembered, measured, reachable, blocked."""
 
+from datetime import datetime
 from typing import Annotated
 
 from mcp_types import CallToolResult, TextContent
@@ -173,13 +174,8 @@ class FindTools:
                 n=k,
             )
             answer = leave_out_beside(recall(world, wanted))
-            events, warned = session.recall_events(), world.memory.warnings
-            others = leave_out_events(warned, events, world.map, now)
-            speaking = () if now is None else find_speaking_events(events, query, now)
-            noted = [f"Noted: {each.sentence(now)}" for each in speaking if now is not None]
-            report = RecallAnswer.of(
-                answer, now=now, warnings=(*noted, *others, *say_elsewhere(world.memory))
-            )
+            warnings = self._say_warnings(world, query, now)
+            report = RecallAnswer.of(answer, now=now, warnings=warnings)
             if now is None:
                 return report
             seen = say_reported(world, session.find_reported, answer, wanted, now=now)
@@ -195,6 +191,13 @@ class FindTools:
             content=[TextContent(type="text", text=report.text)],
             structured_content=report.model_dump(mode="json"),
         )
+
+    def _say_warnings(self, world: WorldModel, query: str, now: datetime | None) -> tuple[str, ...]:
+        """Say what a reader should know first; of events those that have to do with a request."""
+        events = self._session.recall_events()
+        others = leave_out_events(world.memory.warnings, events, world.map, now)
+        noted = [] if now is None else say_events(find_speaking_events(events, query, now), now)
+        return (*(f"Noted: {each}" for each in noted), *others, *say_elsewhere(world.memory))
 
 
 def find_room(world: WorldModel, words: str) -> str:
