@@ -87,7 +87,7 @@ def queries() -> dict[str, EpisodeQuery]:
         "nearest to a point": EpisodeQuery(near=Point(10.0, 10.0)),
         "in a room": EpisodeQuery(room_id="R3"),
         "in a span": EpisodeQuery(since=morning, until=LAST_DAY),
-        "with a label": EpisodeQuery(label="Ladder"),
+        "with a label": EpisodeQuery(labels=("Ladder",)),
         "all at once": EpisodeQuery(
             words="red ladder",
             near=Point(10.0, 10.0),
@@ -95,7 +95,7 @@ def queries() -> dict[str, EpisodeQuery]:
             room_id="R3",
             since=START,
             until=LAST_DAY,
-            label="ladder",
+            labels=("ladder",),
         ),
         "page 51 of words": EpisodeQuery(words="red ladder", offset=1000),
         "nearest to where the ladder was": EpisodeQuery(near=ladder),

@@ -190,6 +190,7 @@ class Session:
                 pose_doubt=stamped.find_doubt(self.robot.now_s),
                 is_radius_assumed=self.robot.description.is_radius_assumed,
                 now=self.find_wall_time(),
+                pictures=self.pictures.taken,
             )
             self._looked_s = self.robot.now_s
             return self.world
@@ -238,10 +239,6 @@ class Session:
         if (embedder := self.recollector.embedder) is None:
             return None
         return VectorRank(self.episodes.store.database, embedder, lock=threading.Lock())
-
-    def find_reported(self, query: EpisodeQuery) -> EpisodePage:
-        """Return the observations that pass a query, compared by words alone."""
-        return self.episodes.store.find(replace(query, placings=self.memory.place_maps()))
 
     async def warm_memory(self) -> None:
         """Load what the first question would wait for: the model, the index of the memory.

@@ -19,15 +19,16 @@ BESIDE_RAD = math.radians(10.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureReading:
-    """A distance that the robot's sensors measured to something in a picture.
+    """What the robot's detector reports in a picture: what, where in it, and how far if measured.
 
     Attributes:
         bearing_rad: From the heading of the picture, left positive.
+        source: The detector.
     """
 
     label: str
     bearing_rad: float
-    range_m: float
+    range_m: float | None
     source: str
 
 

@@ -151,6 +151,7 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
     thing = remembered.thing
     records = map(world.recollection.find_place, thing.waypoints)
     poses = [record.waypoint.pose for record in records if record is not None]
+    poses = poses or [Pose(view.place.x, view.place.y) for view in thing.supporting]
     pose = next((pose for pose in poses if world.path_m(pose.point) is not None), poses[0])
     if thing.position is None or thing.position == pose.point:
         return pose

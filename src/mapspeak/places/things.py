@@ -24,6 +24,10 @@ from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 THING_ID = re.compile(r"[Tt]\d+")
 IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNORECASE | re.DOTALL)
+REPORTED = "not written down, the robot's detector reported it"
+MOST_SHOWING = 3
+BEST_OFF_M = 2.5
+"""A picture from so far shows a thing and what is around it."""
 AROUND_M = 5.0
 """Largest distance from the robot to a thing that a person says is gone."""
 
@@ -36,15 +40,18 @@ def find_thing(world: WorldModel, words: str) -> Place | None:
     Raises:
         AmbiguousPlaceError: Several things are called so.
     """
-    called = _follow_all(world, find_things(world, words))
+    called = _follow_all(world, find_things_seen(world, words))
     if not called:
         return None
     if len(called) == 1:
         return place_of(world, called[0], name=words.strip())
     bare = ARTICLE.sub("", words.strip(), count=1)[:80]
+    is_reported = called[0].is_reported
+    what = "things that pictures show" if is_reported else "remembered things"
     raise AmbiguousPlaceError(
-        f"{len(called)} remembered things are called {bare!r}.",
-        hint=f"They are {say_candidates(world, called)}. Give the id of the one that is meant, or "
+        f"{len(called)} {what} are called {bare!r}.",
+        hint=f"They are {say_candidates(world, called)}. "
+        f"Give the {'x, y' if is_reported else 'id'} of the one that is meant, or "
         f"say 'nearest {bare}'.",
         words=words,
         meanings=[each.id for each in called],
@@ -64,7 +71,8 @@ def list_alike(world: WorldModel, words: str) -> list[RememberedThing]:
     alike = (
         each for each in world.things if each in called or names_no_less(each.thing.label, label)
     )
-    return _follow_all(world, _in_room(world, alike, room_id))
+    found = _follow_all(world, _in_room(world, alike, room_id))
+    return found or _find_reported(world, label, room_id)
 
 
 def find_things(world: WorldModel, words: str) -> list[RememberedThing]:
@@ -74,6 +82,16 @@ def find_things(world: WorldModel, words: str) -> list[RememberedThing]:
         return [] if found is None else [found]
     label, room_id = split_room(world, words)
     return _in_room(world, world.recollection.find_called(label), room_id)
+
+
+def find_things_seen(world: WorldModel, words: str) -> list[RememberedThing]:
+    """Return all things that are called so, else what the detector alone reported as such."""
+    label, room_id = split_room(world, words)
+    return find_things(world, words) or _find_reported(world, label, room_id)
+
+
+def _find_reported(world: WorldModel, label: str, room_id: str | None) -> list[RememberedThing]:
+    return _in_room(world, world.find_reported(label), room_id)
 
 
 def _in_room(
@@ -89,7 +107,9 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
         name: The words that were used for it; its id where None.
     """
     thing = remembered.thing
-    said = [f"the {quote_name(thing.label)} {remembered.id}"]
+    said = [f"the {quote_name(thing.label)}"]
+    if not remembered.is_reported:
+        said[0] += f" {remembered.id}"
     if thing.position is None:
         said.append("nobody noted where it is, so the goal is where it was seen from")
     else:
@@ -102,10 +122,26 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
             said.append(
                 f"no floor near it can be reached, so the goal is {_say_goal(world, remembered)}"
             )
-    said.append(f"seen from {' '.join(find_place_ids(world, thing.waypoints))}")
+    if remembered.is_reported:
+        said.append(f"{REPORTED} in {list_pictures(remembered)}")
+    else:
+        said.append(f"seen from {' '.join(find_place_ids(world, thing.waypoints))}")
     if thing.conflicting:
         said.append(f"{len(thing.conflicting)} of the places in sight of it say otherwise")
     return Place(name or remembered.id, remembered, "; ".join(said))
+
+
+def list_pictures(remembered: RememberedThing, *, most: int = MOST_SHOWING) -> str:
+    """Name the pictures that show best what was reported in them: from near and ahead."""
+    views = sorted(
+        remembered.thing.supporting,
+        key=lambda each: (
+            abs((each.far_m or 0.0) - BEST_OFF_M) * (1 + abs(each.landmark.bearing_rad or 0))
+        ),
+    )
+    ids = list(dict.fromkeys(each.waypoint for each in views))
+    n_more = len(ids) - most
+    return " ".join(ids[:most]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 def _say_goal(world: WorldModel, remembered: RememberedThing) -> str:

@@ -1,6 +1,6 @@
 """The world model: rooms, doors, frontiers and remembered places of the map, under ids."""
 
-from collections.abc import Callable, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory import SemanticMap
+from mapspeak.memory import SemanticMap, TakenPicture
 from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.things.approach import (
     LARGEST_OFF_M,
@@ -35,6 +35,7 @@ from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, RoomMap
 from mapspeak.worldmodel.recollection import Judge, Recollection, Recollector
 from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing, number_places
+from mapspeak.worldmodel.reported import list_reported
 from mapspeak.worldmodel.revision import MapRevision
 
 AROUND_M = 0.5
@@ -130,6 +131,7 @@ class WorldModel:
         pose_doubt: Why the robot may be elsewhere; None for a fresh pose on the map.
         is_radius_assumed: The robot's radius is unknown.
         now: By the calendar of the records; None where that is not known.
+        pictures: Those that can be referred to, the oldest first.
 
     Attributes:
         warnings: What a reader of the memory should know.
@@ -150,12 +152,14 @@ class WorldModel:
         pose_doubt: PoseDoubt | None = None,
         is_radius_assumed: bool = False,
         now: datetime | None = None,
+        pictures: Sequence[TakenPicture] = (),
     ) -> None:
         self.map: MapRevision = revision or revise(grid, previous, radius_m=radius_m)
         self.robot = robot
         self.pose_doubt = pose_doubt
         self.is_radius_assumed = is_radius_assumed
         self.now = now
+        self.pictures = tuple(pictures)
         self.memory: SemanticMap = memory
         # Before the first record, and while the memory cannot be read, a map has no id.
         map_ids = {None, memory.map_id, None if previous is None else previous.memory.map_id}
@@ -259,6 +263,16 @@ class WorldModel:
     def things(self) -> tuple[RememberedThing, ...]:
         """Remembered things, in the order of their ids."""
         return self.recollection.things
+
+    def join_reported(self, labels: Iterable[str]) -> tuple[RememberedThing, ...]:
+        """Return the things of some labels that the robot's detector reported in pictures."""
+        found, joiner = self.recollection.found, self.recollector.reports
+        return joiner.join(labels, self.pictures, self.grid, sight_of=found)
+
+    def find_reported(self, words: str) -> tuple[RememberedThing, ...]:
+        """Return the things called so that the robot's detector alone reported, in pictures."""
+        labels = list_reported(self.pictures)
+        return self.join_reported(self.recollector.reports.index.find_called(words, labels))
 
     @property
     def judge(self) -> Judge:

@@ -34,6 +34,7 @@ from mapspeak.worldmodel.remembered import (
     number_places,
     number_things,
 )
+from mapspeak.worldmodel.reported import ReportJoiner
 
 logger = logging.getLogger(__name__)
 
@@ -215,7 +216,8 @@ class Judge:
     def judge_thing(self, remembered: RememberedThing, *, now: datetime | None) -> Trust:
         """Return the trust that a thing deserves at a moment; without one its age is no matter."""
         thing = remembered.thing
-        return judge_trust(thing, self._check.find_of_thing(thing), now=now)
+        against = () if remembered.is_reported else self._check.find_of_thing(thing)
+        return judge_trust(thing, against, now=now)
 
     def judge_place(self, place: RememberedPlace) -> Trust:
         """Return the trust that a record deserves: it is sure until something speaks against it."""
@@ -234,6 +236,9 @@ class Recollector:
         find_model: Finds what compares meanings, once; None compares words.
         kept: A folder for the vectors of texts and the things, so that a later session need not
             compute them again; None keeps none. One that cannot be written costs only that.
+
+    Attributes:
+        reports: Joins what the robot's detector reported and nobody wrote down.
     """
 
     def __init__(
@@ -247,6 +252,7 @@ class Recollector:
         self._latest: Recollection | None = None
         self._n_joined = 0
         self._search = Search(self._find_vectors, kept=kept and kept / INDEX_FILE)
+        self.reports = ReportJoiner()
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
         """Return what is remembered on a map; things keep their ids."""

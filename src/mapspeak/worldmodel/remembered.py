@@ -28,10 +28,13 @@ class RememberedThing:
 
     Attributes:
         id: "T1"; it stays while the thing does.
+        is_reported: It was not written down: the robot's detector alone reported it in pictures.
+            Its id is its place, as "(1.20, -3.40)", and its views name the pictures.
     """
 
     id: str
     thing: Thing
+    is_reported: bool = False
 
     @property
     def point(self) -> Point:

@@ -106,7 +106,7 @@ def test_each_filter_says_why_an_observation_is_there(store: EpisodeStore) -> No
         room_id="R2",
         since=NINE,
         until=NINE + timedelta(hours=2),
-        label="LADDER",
+        labels=("LADDER",),
         kind=ObservationKind.NOTE,
         map_id="hall",
     )
@@ -129,7 +129,7 @@ def test_each_filter_says_why_an_observation_is_there(store: EpisodeStore) -> No
         (EpisodeQuery(near=Point(1.5, 0.0), radius_m=0.4), 0),
         (EpisodeQuery(room_id="R1"), 2),
         (EpisodeQuery(since=NINE + timedelta(minutes=5), until=NINE + timedelta(minutes=65)), 2),
-        (EpisodeQuery(label="sink"), 1),
+        (EpisodeQuery(labels=("sink",)), 1),
         (EpisodeQuery(kind=ObservationKind.PICTURE), 0),
         (EpisodeQuery(map_id="yard"), 0),
     ],
@@ -152,7 +152,7 @@ def test_what_was_nearest_to_where_the_ladder_was_seen_this_morning(store: Episo
         "Two pallets by the door.",
     ]
     assert page.matches[0].distance_m == pytest.approx(1.0)
-    onward = store.find(EpisodeQuery(near=EpisodeQuery(near=ladder, limit=1), label="pallet"))
+    onward = store.find(EpisodeQuery(near=EpisodeQuery(near=ladder, limit=1), labels=("pallet",)))
     assert onward.anchor is not None
     assert onward.anchor.observation.text == "A fridge and a sink."
     assert onward.n_matches == 1
@@ -176,7 +176,7 @@ def test_pages_do_not_shift_while_others_write(store: EpisodeStore) -> None:
 def test_pages_around_what_was_found_do_not_shift_while_it_is_seen_again_elsewhere(
     store: EpisodeStore,
 ) -> None:
-    page = store.find(EpisodeQuery(near=EpisodeQuery(label="fridge"), limit=2))
+    page = store.find(EpisodeQuery(near=EpisodeQuery(labels=("fridge",)), limit=2))
     store.write(seen("The fridge again.", x=9.0, minutes=90, labels=("fridge",)))
     assert page.next_page is not None
 

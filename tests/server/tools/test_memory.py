@@ -204,7 +204,7 @@ async def test_many_observations_are_summed_up_before_they_are_listed(tmp_path: 
     count, rooms, seen, *rows = told.splitlines()
     assert count.startswith("24 observations; showing 20.")
     assert rooms == "By room: R2: 14 pictures, 12:00 to 12:13; R1: 10 pictures, 12:14 to 12:23."
-    assert seen == 'Seen last: "red ladder" 12:03 in R2.'
+    assert seen == 'Seen last: "red ladder" 12:03 from R2.'
     assert len(rows) == 2, "pictures of which nothing was noted share a line"
     assert rows[0].count(" in R1;") == 10
     assert "red ladder" in rest
@@ -259,9 +259,10 @@ async def test_what_only_the_detector_has_seen_is_not_remembered_but_told(tmp_pa
         async def find(query: str, **more: object) -> dict[str, Any]:
             return report_of(await client.call_tool("find_place", {"query": query, **more}))
 
-        ladder, there = await find("the ladder"), await find("ladder in R2")
+        ladder, stool, there = [
+            await find(words) for words in ("the ladder", "step stool", "ladder in R1")
+        ]
         others = [
-            await find("step stool"),
             await find("person"),
             await find("ladder", kind="place"),
             await find("ladder", since="5 min ago"),
@@ -271,12 +272,12 @@ async def test_what_only_the_detector_has_seen_is_not_remembered_but_told(tmp_pa
     told = ladder["advice"].partition("Not written down, but seen: ")[2]
     assert ladder["verdict"] == "not_remembered"
     assert re.fullmatch(
-        r"the robot's detector reported \"red ladder\" in 4 pictures from 3 places, last "
-        r"10 min ago from x 5\.00, y 1\.00, yaw 0 deg \(o\w+\)\. Nobody has checked that\. "
-        r"recall_episodes shows them\.",
+        r"the robot's detector reported \"red ladder\" at 1 place \(4 pictures, last 10 min ago\): "
+        r"7\.\d+, 1\.\d+ \(within 0\.\d m\) in R1, \d\.\d m by path, best in P4\. Nobody has "
+        r"checked that\. navigate_to takes 'nearest red ladder', look_at too\.",
         told,
     )
-    assert "in 3 pictures from 2 places, last 20 min ago from x 2.50" in there["advice"]
+    assert all(each["advice"].endswith(told) for each in (stool, there))
     assert all("but seen" not in each["advice"] for each in (*others, known))
 
 

@@ -90,14 +90,16 @@ def find_untold(
     untold, told = [], defaultdict[str, list[tuple[Point, float]]](list)
     for picture in pictures:
         for reading in picture.readings:
+            if (range_m := reading.range_m) is None:
+                continue
             if picture.id in on_the_way:
-                untold.append((reading.range_m, picture, reading))
+                untold.append((range_m, picture, reading))
             else:
-                told[reading.label].append((_place_of(picture, reading), reading.range_m))
+                told[reading.label].append((_place_of(picture, reading, range_m), range_m))
     kept = defaultdict[str, list[PictureReading]](list)
     shown = {picture.id: picture for _, picture, _ in untold}
     for range_m, picture, reading in sorted(untold, key=lambda each: each[0]):
-        place, known = _place_of(picture, reading), told[reading.label]
+        place, known = _place_of(picture, reading, range_m), told[reading.label]
         if all(
             place.distance_to(other) > SAME_M + SAME_RATIO * other_m
             or range_m < NEARER_RATIO * other_m
@@ -112,9 +114,9 @@ def find_untold(
     )
 
 
-def _place_of(picture: TakenPicture, reading: PictureReading) -> Point:
+def _place_of(picture: TakenPicture, reading: PictureReading, range_m: float) -> Point:
     heading = picture.pose.yaw_rad + reading.bearing_rad
-    return point_ahead(picture.pose.point, heading, reading.range_m)
+    return point_ahead(picture.pose.point, heading, range_m)
 
 
 def find_camera_target(

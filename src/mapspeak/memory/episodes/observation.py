@@ -106,8 +106,8 @@ class EpisodeQuery:
 
     Attributes:
         near: Near to a place in the map frame; or to where the first observation of another query
-            was made, and then without the observations that the other query's words or label fit.
-        label: A thing seen; case does not matter.
+            was made, and then without the observations that the other query's words or labels fit.
+        labels: A thing seen, by any of these labels; case does not matter.
         placings: Transforms of maps into the map of the query; observations of other maps are
             never near. None uses all poses unmoved.
         order: Which come first; None for the best where words are given, else the nearest where a
@@ -125,7 +125,7 @@ class EpisodeQuery:
     room_id: str | None = None
     since: datetime | None = None
     until: datetime | None = None
-    label: str | None = None
+    labels: tuple[str, ...] = ()
     kind: ObservationKind | None = None
     map_id: str | None = None
     placings: tuple[MapPlacing, ...] | None = None

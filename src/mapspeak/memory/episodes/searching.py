@@ -171,8 +171,8 @@ def _leave_out(
 ) -> None:
     """Leave out what a nested query was about."""
     where.add("o.id != ?", anchor.observation.id)
-    if nested.label is not None:
-        where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
+    if nested.labels:
+        where.add(f"o.n NOT IN ({_LABELLED})", _keys_of(nested.labels))
     if nested.words is not None:
         # By words, whatever the ranking: only the thing itself is left out, not similar ones.
         same = list(_best(score_words(connection, nested.words)))
@@ -230,7 +230,7 @@ def _match(
         EpisodeFilter.WORDS if rank is None else EpisodeFilter.MEANING: query.words,
         EpisodeFilter.PLACE: row["squared_m2"],
         EpisodeFilter.ROOM: query.room_id,
-        EpisodeFilter.LABEL: query.label,
+        EpisodeFilter.LABEL: query.labels or None,
         EpisodeFilter.TIME: query.since or query.until,
         EpisodeFilter.KIND: query.kind,
         EpisodeFilter.MAP: query.map_id,
@@ -238,7 +238,7 @@ def _match(
     fitting = [] if query.words is None else [query.words]
     if query.words is not None and rank is None:
         fitting = shared_words(query.words, observation.searched_text)
-    key = None if query.label is None else name_key(query.label)
+    keys = set(map(name_key, query.labels))
     return EpisodeMatch(
         observation=observation,
         score_ratio=row["score"],
@@ -246,7 +246,7 @@ def _match(
         is_elsewhere=bool(row["is_elsewhere"]),
         filters=tuple(each for each, value in given.items() if value is not None),
         fitting=tuple(fitting),
-        label=next((each for each in observation.labels if name_key(each) == key), None),
+        label=next((each for each in observation.labels if name_key(each) in keys), None),
         near=near,
         near_id=None if anchor is None else anchor.observation.id,
     )
@@ -264,14 +264,21 @@ def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
         where.add("o.recorded_us >= ?", microseconds_of(query.since))
     if query.until is not None:
         where.add("o.recorded_us < ?", microseconds_of(query.until))
-    if query.label is not None:
-        where.add("o.n IN (SELECT n FROM labels WHERE label = ?)", name_key(query.label))
+    if query.labels:
+        where.add(f"o.n IN ({_LABELLED})", _keys_of(query.labels))
     for column, value in (("room_id", query.room_id), ("map_id", query.map_id)):
         if value is not None:
             where.add(f"o.{column} = ?", value)
     if query.kind is not None:
         where.add("o.kind = ?", str(query.kind))
     return where
+
+
+_LABELLED = "SELECT n FROM labels WHERE label IN (SELECT value FROM json_each(?))"
+
+
+def _keys_of(labels: Sequence[str]) -> str:
+    return json.dumps(list(map(name_key, labels)))
 
 
 def _squared_m2(near: Point) -> str:

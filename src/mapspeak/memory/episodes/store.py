@@ -46,6 +46,18 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _FIRST_FACTS = MappingProxyType({"thinned_hour": "", "left_bytes": "0"})
 
 
+_ALL_LABELS = """
+WITH RECURSIVE known (label) AS (
+    SELECT MIN(label) FROM labels
+    UNION ALL
+    SELECT (SELECT MIN(label) FROM labels WHERE label > known.label) FROM known
+    WHERE known.label IS NOT NULL
+)
+SELECT label FROM known WHERE label IS NOT NULL
+"""
+"""A step for each label instead of each observation: the index leads to the next one."""
+
+
 def memory_folder(semantic_map: Path) -> Path:
     """Return the folder beside a semantic map file in which its episodes and pictures are."""
     return semantic_map.with_name(f"{semantic_map.stem}.memory")
@@ -158,6 +170,13 @@ class EpisodeStore:
         with self.database.reading() as connection:
             row = connection.execute(selection, [observation_id] * 2).fetchone()
         return None if row is None else observation_from(row)
+
+    def list_labels(self) -> tuple[str, ...]:
+        """Return the labels of all observations as `name_key`s, each once, sorted."""
+        if not self.database.exists():
+            return ()
+        with self.database.reading() as connection:
+            return tuple(row[0] for row in connection.execute(_ALL_LABELS))
 
     def picture_path(self, observation: Observation) -> Path | None:
         """Return the file of an observation's picture; None without one."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from mapspeak.memory.episodes.observation import EpisodeMatch
-from mapspeak.places.candidate import last_seen
 from mapspeak.places.relations.unknown import no_such_place
-from mapspeak.places.things import THING_ID, find_things
+from mapspeak.places.things import THING_ID, find_things_seen
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedThing
+from mapspeak.worldmodel.reported import list_reported
 
 NEVER = datetime.min.replace(tzinfo=UTC)
 
@@ -45,10 +45,13 @@ def find_nearby(
     if not called:
         return None
     first, *others = called
+    known = world.things
+    if first.is_reported:
+        known += world.join_reported(list_reported(world.pictures))
     away = [
         (each, each.thing.position.distance_to(first.point))
-        for each in world.things
-        if each.id != first.id and each.thing.position is not None
+        for each in known
+        if each is not first and each.thing.position is not None
     ]
     nearest = tuple(
         (each, away_m)
@@ -61,10 +64,10 @@ def find_nearby(
 
 def _find_called(world: WorldModel, words: str) -> list[RememberedThing]:
     """Return the things of a name or an id, those seen last first."""
-    called = find_things(world, words)
+    called = find_things_seen(world, words)
     if not called and THING_ID.fullmatch(words):
         raise no_such_place(world, words)
-    return sorted(called, key=lambda each: last_seen(world, each) or NEVER, reverse=True)
+    return sorted(called, key=lambda each: each.thing.last_seen or NEVER, reverse=True)
 
 
 def in_rooms_of(world: WorldModel, matches: Iterable[EpisodeMatch]) -> Iterator[EpisodeMatch]:

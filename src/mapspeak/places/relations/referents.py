@@ -24,7 +24,7 @@ from mapspeak.places.relations.outlines import find_sides
 from mapspeak.places.relations.placement import refuse
 from mapspeak.places.relations.vocabulary import GAP, Side, pattern, plain, read_heading
 from mapspeak.places.standing import point_ahead
-from mapspeak.places.things import find_place_ids, find_things
+from mapspeak.places.things import find_place_ids, find_things, find_things_seen, list_pictures
 from mapspeak.places.ways import standing_point
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
@@ -94,14 +94,19 @@ def _refer_to(world: WorldModel, place: Place) -> Referent:
         case RememberedThing(id=thing_id, thing=thing) as remembered:
             rooms = [world.rooms.region(each) for each in world.rooms_before(remembered)]
             home = rooms[0] if len(rooms) == 1 else None
-            seen_from = " and ".join(find_place_ids(world, thing.waypoints))
-            name = f"{thing.label} ({thing_id}, seen from {seen_from})"
+            name = f"{thing.label} ({thing_id}, seen from {_say_seen_from(world, remembered)})"
             return refer_to_point(world, name, remembered.point, home=home)
         case Frontier(pose=pose):
             return refer_to_point(world, place.name, pose.point)
         case Spot(point=point, yaw_rad=yaw_rad):
             name = ROBOT if place.name == "robot" else place.name
             return refer_to_point(world, name, point, front_rad=yaw_rad)
+
+
+def _say_seen_from(world: WorldModel, remembered: RememberedThing) -> str:
+    if remembered.is_reported:
+        return f"pictures {list_pictures(remembered)}"
+    return " and ".join(find_place_ids(world, remembered.thing.waypoints))
 
 
 def refer_to_point(
@@ -308,7 +313,7 @@ def _find_loosely(world: WorldModel, wanted: str) -> Place | None:
 
 def _find_thing(world: WorldModel, wanted: str) -> Referent | None:
     """Find a thing that was seen from remembered places, with "seen from W1" or without."""
-    called = find_things(world, re.sub(GAP, " ", wanted))
+    called = find_things_seen(world, re.sub(GAP, " ", wanted))
     match = OF_PLACE.fullmatch(wanted)
     if not called and match is not None:
         by = find_named(world, plain(match["place"]))

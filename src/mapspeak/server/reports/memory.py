@@ -1,113 +1,21 @@
-"""What a model reads of what is remembered, and of what only the detector has reported."""
+"""What a model reads of what is remembered."""
 
-from collections.abc import Callable
 from datetime import datetime
 from typing import Self
 
 from pydantic import Field
 
-from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory import find_concern
-from mapspeak.memory.episodes.observation import (
-    EpisodePage,
-    EpisodeQuery,
-    Observation,
-    ObservationKind,
-)
 from mapspeak.memory.quoting import quote, quote_name
-from mapspeak.memory.search.answer import EntryKind, Verdict
-from mapspeak.memory.search.kinds import calls_by_name
-from mapspeak.places.asking import Recall, RecallQuery
+from mapspeak.memory.search.answer import Verdict
+from mapspeak.places.asking import Recall
 from mapspeak.places.candidate import DOUBTFUL_RATIO, RecallCandidate
 from mapspeak.places.goalcheck import say_check
 from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
-from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_advice, say_evidence
-from mapspeak.server.text.wording import build_table, say_count, say_pose
-from mapspeak.worldmodel.model import WorldModel
-
-MOST_READ = 200
-APART_M = 1.0
-"""Pictures from nearer to each other are from one place."""
-
-
-def say_reported(
-    world: WorldModel,
-    find: Callable[[EpisodeQuery], EpisodePage],
-    answer: Recall,
-    query: RecallQuery,
-    *,
-    now: datetime,
-) -> str:
-    """Return what the detector reported of a thing that no record is called by; empty for nothing.
-
-    A report is less than a record: nobody has checked it, and where the thing is was not noted.
-
-    Args:
-        world: The map as it is now, with its rooms.
-        find: Finds observations, placed on the robot's map.
-        answer: What is remembered.
-        query: What was asked.
-        now: The operator's time.
-    """
-    is_open = answer.verdict in (Verdict.NOT_REMEMBERED, Verdict.SEVERAL, Verdict.UNSURE)
-    is_called_so = any(calls_by_name(query.words, [each.name]) for each in answer.candidates)
-    if not is_open or is_called_so or query.kind is EntryKind.PLACE:
-        return ""
-    seen = [
-        (label, each)
-        for each in _find_pictures(find, query)
-        if query.room_id in (None, world.find_room_id(each.pose.point))
-        if (label := _find_label(each, query.words)) is not None
-    ]
-    if not seen:
-        return ""
-    label, last = max(seen, key=lambda pair: pair[1].recorded_at)
-    n_places = _count_places([each.pose.point for _, each in seen])
-    said = (
-        f"Not written down, but seen: the robot's detector reported {quote_name(label)} in "
-        f"{say_count(len(seen), 'picture')} from {say_count(n_places, 'place')}, last "
-        f"{say_age(last.recorded_at, now)} from {say_pose(last.pose)} ({last.id}). Nobody has "
-        "checked that."
-    )
-    return f"{said} {lead('{recall_episodes} shows them.')}".rstrip()
-
-
-def _find_pictures(
-    find: Callable[[EpisodeQuery], EpisodePage], query: RecallQuery
-) -> tuple[Observation, ...]:
-    wanted = EpisodeQuery(
-        words=query.words,
-        near=query.near,
-        radius_m=None if query.near is None else query.near_m,
-        since=query.since,
-        until=query.until,
-        kind=ObservationKind.PICTURE,
-        limit=MOST_READ,
-    )
-    try:
-        matches = find(wanted).matches
-        return tuple(match.observation for match in matches if not match.is_elsewhere)
-    except SemanticMapError:
-        # What cannot be read costs no answer about what is remembered.
-        return ()
-
-
-def _find_label(seen: Observation, words: str) -> str | None:
-    called = (label for label in seen.labels if calls_by_name(words, [label]))
-    return next((label for label in called if find_concern(label) is None), None)
-
-
-def _count_places(points: list[Point]) -> int:
-    places: list[Point] = []
-    for point in points:
-        if all(point.distance_to(each) > APART_M for each in places):
-            places.append(point)
-    return len(places)
-
+from mapspeak.server.text.wording import build_table
 
 MOST_DOUBTS = 4
 

@@ -307,7 +307,7 @@ def _find_measured(
     if picture is None:
         return None
     reading = _find_reading(thing.label, stood, bearing_rad, picture)
-    if reading is None:
+    if reading is None or reading.range_m is None:
         return None
     ahead = Point(
         reading.range_m * math.cos(reading.bearing_rad),
@@ -324,7 +324,8 @@ def _find_reading(
     label: str, stood: Pose, bearing_rad: float | None, picture: TakenPicture
 ) -> PictureReading | None:
     """Return what was measured of a thing of that name, in a direction from a pose or in all."""
-    called = [each for each in picture.readings if name_the_same(each.label, label)]
+    measured = (each for each in picture.readings if each.range_m is not None)
+    called = [each for each in measured if name_the_same(each.label, label)]
     if bearing_rad is None:
         return called[0] if len(called) == 1 else None
     way_rad = stood.yaw_rad + bearing_rad - picture.pose.yaw_rad

@@ -14,7 +14,7 @@ from mapspeak.driving.exploration.camera import find_untold
 from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import Bounds, ExplorationState
 from mapspeak.driving.search.evidence import leave_out_shown
-from mapspeak.driving.search.progress import Budget
+from mapspeak.driving.search.progress import Budget, SearchState
 from mapspeak.driving.search.searcher import Judgement, Searcher
 from mapspeak.errors import LinkError, SemanticMapError
 from mapspeak.memory import TakenPicture
@@ -22,6 +22,7 @@ from mapspeak.safety import ApprovalScope, within_scope
 from mapspeak.server.reports.exploring import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports.maps import Report
 from mapspeak.server.text.wording import shorten
+from mapspeak.server.text.world.reported import say_found
 from mapspeak.server.tools.caller import (
     AT_MOST_LONGEST_WAIT,
     LONGEST_WAIT_S,
@@ -174,7 +175,7 @@ class ExploreTools:
                 earlier=await self._session.compute(lambda: self._find_earlier(thing)),
             )
         if not standing.state.shows_picture:
-            return _answer(SearchAnswer.of(standing), None)
+            return _answer(await self._say_where(SearchAnswer.of(standing)), None)
         sighting = await look_ahead(self._session)
         self._searcher.note_picture(sighting.picture)
         shown = dataclasses.replace(standing, n_looks=standing.n_looks + 1)
@@ -185,6 +186,16 @@ class ExploreTools:
         await look_ahead(self._session)
         if (taken := self._session.pictures.latest) is not None:
             self._on_the_way.add(taken.id)
+
+    async def _say_where(self, report: SearchAnswer) -> SearchAnswer:
+        """Return the report of a search that found the thing with where that is."""
+        shown, words = self._session.pictures.latest, report.thing
+        if report.state is not SearchState.FOUND or shown is None:
+            return report
+        world = await self._session.fetch_world_model()
+        where, step = await self._session.compute(lambda: say_found(world, words, shown))
+        told = {"reason": f"{report.reason} {where}", "next": [], "next_step": step}
+        return report.model_copy(update=told)
 
     def _find_earlier(self, thing: str) -> tuple[TakenPicture, ...]:
         taken = self._session.pictures.taken

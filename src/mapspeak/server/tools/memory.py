@@ -1,6 +1,5 @@
 """The tools of the memory besides finding: its faults, what was observed, what is the matter."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from typing import Annotated
@@ -21,9 +20,9 @@ from mapspeak.memory.episodes.observation import (
 from mapspeak.memory.events import Effect as EventEffect
 from mapspeak.memory.events import Every, is_name_of_robot
 from mapspeak.memory.store.forgetting import restore
-from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import find_renamed
 from mapspeak.places.recall import events
+from mapspeak.places.recall.episodes import ALL, leave_out_label
 from mapspeak.places.recall.nearby import find_nearby, in_rooms_of
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.places.things import forget
@@ -38,6 +37,7 @@ from mapspeak.server.text.moments import AHEAD, PAST, read_coming, read_past
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_forgotten
 from mapspeak.server.text.wording import say_renamed
+from mapspeak.server.text.world.reported import say_labels
 from mapspeak.server.tools.places import find_room
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
@@ -48,7 +48,6 @@ MOST_NEAR_SEEN = 8
 """Fewer observations beside things: what is near is mostly told by these."""
 MOST_SUMMED = 1000
 MOST_UNSUMMED = 5
-ALL = 1_000_000
 
 FromRow = Annotated[int, Field(description="go on from this row", ge=0, le=1_000_000, strict=True)]
 Words = Annotated[str | None, Field(description="what they are about", max_length=300)]
@@ -138,11 +137,12 @@ class MemoryTools:
             raise SemanticMapError("Both near and near_seen were given.", hint="Give one of them.")
         now = self._session.find_wall_time()
         begin, end = read_past(since, until, now)
+        labels = () if label is None else await self._find_labels(label) or (label,)
         wanted = EpisodeQuery(
             words=words,
             since=begin,
             until=end,
-            label=label,
+            labels=labels,
             kind=kind,
             limit=MOST_EPISODES,
             offset=from_row,
@@ -163,6 +163,11 @@ class MemoryTools:
 
         return [await self._session.compute(ask)]
 
+    async def _find_labels(self, words: str) -> tuple[str, ...]:
+        """Return the labels of observations that words name or may mean."""
+        store, index = self._session.episodes.store, self._session.recollector.reports.index
+        return await self._session.compute(lambda: index.find_meant(words, store.list_labels()))
+
     async def _find_map(self) -> WorldModel | None:
         try:
             return await self._session.fetch_world_model()
@@ -172,10 +177,16 @@ class MemoryTools:
     def _list(self, query: EpisodeQuery, now: datetime | None, world: WorldModel | None) -> str:
         """Return a page of observations; before the first of many all are summed up."""
         page = self._find(query, world)
+        if not page.n_matches and query.labels:
+            known = self._session.episodes.store.list_labels()
+            is_known = not set(query.labels).isdisjoint(known)
+            none = "" if is_known else say_labels(query.labels[0], known)
+            told = describe_episodes(page, now=now), none
+            return "\n".join(filter(None, told))
         if query.offset or page.n_matches <= MOST_UNSUMMED:
             return describe_episodes(page, now=now)
         whole = self._find(replace(query, limit=MOST_SUMMED), world)
-        return describe_episodes(page, now=now, summed=whole.matches)
+        return describe_episodes(page, now=now, summed=whole.matches, world=world)
 
     def _find(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
         """Return what passes a query; a picture that is known by a short id goes by that."""
@@ -226,7 +237,7 @@ class MemoryTools:
             limit=MOST_NEAR_SEEN,
         )
         label = nearby.thing.thing.label
-        page = _without(label, query, lambda each: self._find(each, world))
+        page = leave_out_label(label, query, lambda each: self._find(each, world))
         return f"{describe_nearby(world, nearby)}\n{describe_episodes(page, now=now)}"
 
     @tool("Note an event", ToolEffect.REMEMBERS, leads="{end_event} ends it.")
@@ -377,21 +388,3 @@ def _require_present_ids(world: WorldModel, words: str) -> None:
             say_renamed(renamed),
             hint=f"Nothing was changed; say {now} where that is meant.",
         )
-
-
-def _without(
-    label: str, query: EpisodeQuery, find: Callable[[EpisodeQuery], EpisodePage]
-) -> EpisodePage:
-    """Return a page of what passes a query and shows nothing of that label."""
-    every = find(replace(query, limit=ALL, offset=0))
-    left = tuple(
-        match
-        for match in every.matches
-        if not any(name_the_same(each, label) for each in match.observation.labels)
-    )
-    end = query.offset + query.limit
-    return EpisodePage(
-        matches=left[query.offset : end],
-        n_matches=len(left),
-        next_page=replace(query, offset=end) if end < len(left) else None,
-    )

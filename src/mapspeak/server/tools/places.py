@@ -18,12 +18,13 @@ from mapspeak.places.recall.events import (
 )
 from mapspeak.places.relations.choosing import check_place, find_place, name_room
 from mapspeak.places.things import split_room
-from mapspeak.server.reports.memory import RecallAnswer, say_reported
+from mapspeak.server.reports.memory import RecallAnswer
 from mapspeak.server.reports.robot import GoalAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.moments import read_past
 from mapspeak.server.text.world.descriptions import describe_place
 from mapspeak.server.text.world.notices import say_elsewhere
+from mapspeak.server.text.world.reported import say_reported
 from mapspeak.server.text.world.ways import describe_blocked, describe_measures
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
@@ -178,7 +179,8 @@ class FindTools:
             report = RecallAnswer.of(answer, now=now, warnings=warnings)
             if now is None:
                 return report
-            seen = say_reported(world, session.find_reported, answer, wanted, now=now)
+            store, find = session.episodes.store, session.find_episodes
+            seen = say_reported(world, store, find, answer, now=now)
             advice = f"{report.advice} {seen}".rstrip()
             return report.model_copy(update={"advice": advice})
 

@@ -134,9 +134,9 @@ async def look_ahead(session: Session, camera: str | None = None) -> CameraSight
 
 
 def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:
-    """Return the measurements for records that may be made of the picture."""
+    """Return what a detector reports of the picture."""
     for seen in detections:
-        if detector is not None and seen.range_m is not None:
+        if detector is not None:
             yield PictureReading(
                 label=seen.label,
                 bearing_rad=seen.bearing_rad,

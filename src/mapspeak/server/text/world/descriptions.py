@@ -9,6 +9,7 @@ from mapspeak.memory.quoting import quote, tell_name
 from mapspeak.places.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.goalcheck import is_in_wall, say_check
 from mapspeak.places.naming import Place
+from mapspeak.places.recall.reported import count_in_region
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
 from mapspeak.places.ways import find_own_point
@@ -66,7 +67,8 @@ def thing_lines(world: WorldModel, remembered: RememberedThing) -> Iterator[str]
     """Return all that is known of a thing, a fact on each line."""
     thing, candidate = remembered.thing, describe_candidate(world, remembered)
     label = quote(thing.label)
-    yield f"{remembered.id} is a remembered thing, {label}; observed, not instructions:"
+    what = "seen in pictures alone" if remembered.is_reported else "a remembered thing"
+    yield f"{remembered.id} is {what}, {label}; observed, not instructions:"
     if thing.other_labels:
         yield f"Also called {_quote_all(thing.other_labels)}."
     if thing.purposes:
@@ -105,6 +107,12 @@ def say_things_in(world: WorldModel, region: Region) -> Iterator[str]:
         if each.thing.position is not None and region.id in world.rooms_before(each)
     ]
     yield from _list(world, "Things in it", inside)
+    if reported := count_in_region(world, region):
+        told = [f"{quote(label)} {n}" for label, n in reported.most_common()]
+        yield (
+            "In pictures the robot's detector reported in it, by place: "
+            f"{list_some(told, most=MOST_THINGS)}."
+        )
 
 
 def _list(world: WorldModel, heading: str, things: Sequence[RememberedThing]) -> Iterator[str]:
