@@ -239,6 +239,9 @@ async def test_where_a_thing_was_seen_is_its_own_room_and_near_is_near_to_it(
             await visit.look(2.0, 1.0, ("poster", Point(20.0, 20.0)))
         told = await visit.ask("recall_episodes")
         near = await visit.ask("recall_episodes", near_seen="extinguisher", radius_m=2)
+    async with visiting(tmp_path) as visit:
+        later = await visit.ask("recall_episodes", near_seen="extinguisher")
+    assert "Near to where this was made, not to what it shows: o" in later
     last = next(line for line in told.splitlines() if line.startswith("Seen last: "))
     assert room_said(last, "fire extinguisher, cone") == "in R1"
     assert room_said(last, "poster") == "from R2"

@@ -49,7 +49,8 @@ def describe_episodes(
     lines = [f"{counted} {OBSERVED}"]
     lines += _sum_up(summed, page.n_matches, now, world)
     if page.anchor is not None:
-        lines.append(f"Near to where this was: {say_episode(page.anchor, now=now)}")
+        anchor = say_episode(page.anchor, now=now)
+        lines.append(f"Near to where this was made, not to what it shows: {anchor}")
     bare = [match for match in page.matches if _is_bare(match)]
     shared = bare if len(bare) > MOST_BARE else []
     lines += [say_episode(match, now=now) for match in page.matches if match not in shared]
@@ -146,9 +147,10 @@ def describe_nearby(world: WorldModel, nearby: Nearby) -> str:
     lines = [f"Nearest to {_say_thing(world, thing)}, at {where}."]
     if nearby.others:
         others = "; ".join(_say_thing(world, each) for each in nearby.others[:MOST_THINGS])
+        meant = "its name with its room" if thing.is_reported else "the id of the one that is meant"
         lines[0] += (
             f" It was seen last of {len(nearby.others) + 1} called so; the others are {others}: "
-            "give near_seen the id of the one that is meant."
+            f"give near_seen {meant}."
         )
     nearest = nearby.nearest[:MOST_THINGS]
     told = [f"{_say_thing(world, each)}, {away_m:.1f} m" for each, away_m in nearest]
