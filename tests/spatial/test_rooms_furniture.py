@@ -224,3 +224,24 @@ def test_no_wall_runs_on_behind_furniture_from_what_is_none() -> None:
     rooms = find_rooms(_grid(SHADOW_BEHIND_THE_WALL))
 
     assert len(rooms.regions) == 3
+
+
+def _draw_hall_with_boards(*boards: slice) -> OccupancyGrid:
+    """Draw a hall of 11.6 by 3.2 m, and across its middle boards of 0.2 m."""
+    cells = np.full((72, 240), 100, np.int8)
+    cells[4:68, 4:236] = 0
+    for board in boards:
+        cells[board, 118:122] = 100
+    return OccupancyGrid(cells=cells, resolution_m=0.05)
+
+
+def test_a_board_that_stands_out_from_a_wall_is_furniture() -> None:
+    (hall,) = find_rooms(_draw_hall_with_boards(slice(4, 20))).regions
+
+    assert hall.floor_area_m2 - hall.free_area_m2 == pytest.approx(0.8 * 0.2, rel=0.2)
+
+
+def test_boards_on_both_sides_of_a_door_are_walls() -> None:
+    rooms = find_rooms(_draw_hall_with_boards(slice(4, 28), slice(46, 68)))
+
+    assert [room.floor_area_m2 for room in rooms.regions] == pytest.approx([18.3, 18.3], rel=0.02)

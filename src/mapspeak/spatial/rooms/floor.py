@@ -19,10 +19,12 @@ from mapspeak.spatial.rooms.raster import (
     Picture,
     Raster,
     build_raster,
+    close_gaps,
     drop_specks,
     find_boxes,
     find_cells,
     find_touching,
+    is_short,
     label_parts,
     widen,
 )
@@ -125,7 +127,7 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
     """Return 1 where an obstacle is wall, and 1 where it cannot be a free-standing island.
 
     Wall is a long run in a main direction, or in line with one, and one of half that length that
-    ends at a wall.
+    leads on from a wall.
 
     A run of twice that length is wall in any direction, and so are long curved walls. An
     obstacle thicker than a wall, such as a cupboard, is not part of a wall that it is in line with.
@@ -136,7 +138,8 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
     large, slender = _sort_obstacles(raster.free, SETTINGS.island_size_m / size_m)
     can_be_piece = _find_thinner(occupied, SETTINGS.wall_thickness_m / size_m) & (large | slender)
     can_be_stub = _find_thinner(occupied, SETTINGS.tip_m / size_m + 1) & (large | slender)
-    wall, stub = np.zeros_like(occupied), np.zeros_like(occupied)
+    wall = np.zeros_like(occupied)
+    shorter: dict[float, Picture] = {}
     for angle_deg in directions_deg:
         for turned_deg in (angle_deg, angle_deg + 90):
             long_run = _open(thick, SETTINGS.wall_length_m / size_m, turned_deg) & occupied & large
@@ -144,13 +147,59 @@ def find_walls(raster: Raster, directions_deg: list[float]) -> tuple[Picture, Pi
             reach = _line(2 * SETTINGS.wall_reach_m / size_m, turned_deg)
             in_line = np.asarray(cv2.dilate(long_run, reach), np.uint8)
             wall |= long_run | (piece & in_line)
-            stub |= _open(thick, SETTINGS.wall_length_m / 2 / size_m, turned_deg)
+            half = _open(thick, SETTINGS.wall_length_m / 2 / size_m, turned_deg)
+            shorter[turned_deg] = half & can_be_stub
     any_way = np.zeros_like(occupied)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
         any_way |= _open(thick, SETTINGS.oblique_length_m / size_m, turned_deg)
     obstacle = occupied & large
     wall |= any_way & obstacle
-    return wall | find_touching(stub & can_be_stub, wall), obstacle
+    return wall | _find_short_walls(shorter, wall, raster), obstacle
+
+
+def _find_short_walls(shorter: dict[float, Picture], wall: Picture, raster: Raster) -> Picture:
+    """Return the runs that lead on from a wall.
+
+    With floor on both sides they lead to a wall at their other end too, or to a door between: what
+    just sticks out of a wall into a room is a desk.
+
+    Args:
+        shorter: The thin runs in each direction, in degrees.
+    """
+    runs = np.bitwise_or.reduce([*shorter.values(), np.zeros_like(wall)])
+    short = find_touching(runs, wall) & (1 - wall)
+    n, number = label_parts(short, connectivity=8)
+    if n == 1:
+        return short
+    end = widen(wall, 1)
+    for angle_deg, along in shorter.items():
+        if (mine := along & short).any():
+            end |= mine & _find_doors(wall | along, angle_deg, raster)
+    thick = round(SETTINGS.tip_m / raster.cell_size_m) + 1
+    solid = 1 - raster.free
+    parts_floor = is_short(solid, thick, 0) | is_short(solid, thick, 1)
+    n_cells, n_parting = (
+        np.bincount(number.ravel()[np.flatnonzero(cells)], minlength=n)
+        for cells in (short, parts_floor & (short > 0))
+    )
+    _, contact = label_parts(short & end, connectivity=8)
+    cells = np.flatnonzero(contact)
+    pairs = np.unique(contact.ravel()[cells] * np.int64(n) + number.ravel()[cells])
+    n_ends = np.bincount(pairs % n, minlength=n)
+    is_wall = (2 * n_parting <= n_cells) | (n_ends > 1)
+    is_wall[0] = False
+    return np.take(is_wall.view(np.uint8), number)
+
+
+def _find_doors(wall: Picture, angle_deg: float, raster: Raster) -> Picture:
+    """Return the floor between walls in line along a direction, and the cells at its ends."""
+    # Narrower gaps are cracks; what is farther off than two leaves is across a room.
+    crack, opening = (
+        close_gaps(wall, _line(width_m / raster.cell_size_m, angle_deg))
+        for width_m in (2 * SETTINGS.least_clearance_m, 2 * SETTINGS.leaf_width_m)
+    )
+    door = opening & (1 - crack) & raster.free
+    return np.asarray(cv2.dilate(door, _line(2, angle_deg)), np.uint8)
 
 
 def _find_thinner(occupied: Picture, cells: float) -> Picture:

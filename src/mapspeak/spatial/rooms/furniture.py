@@ -13,7 +13,7 @@ from mapspeak.spatial.rooms.raster import (
     Picture,
     Raster,
     Truths,
-    close_box,
+    close_gaps,
     drop_small,
     drop_specks,
     find_boxes,
@@ -72,8 +72,9 @@ def find_blocks(raster: Raster, wall: Picture, *, longest_m: float) -> tuple[Pic
     crumb = rest & (1 - fixed)
     block |= find_touching(crumb & (1 - joined), block)
     block |= widen(block, cells.rim) & crumb
+    side = 2 * cells.tip + 1
     # Nothing sees what lies between two blocks, so that no bump begins there.
-    behind &= (bump & widen(block, cells.tip)) | close_box(block, 2 * cells.tip + 1)
+    behind &= (bump & widen(block, cells.tip)) | close_gaps(block, np.ones((side, side), np.uint8))
     return block, behind & (1 - block)
 
 

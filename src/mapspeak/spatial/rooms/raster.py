@@ -300,11 +300,11 @@ def open_box(picture: Picture, high: int, wide: int) -> Picture:
     )
 
 
-def close_box(picture: Picture, side: int) -> Picture:
-    """Return the set cells, and gaps between them that no square of this many cells fits into."""
-    box = np.ones((side, side), np.uint8)
+def close_gaps(picture: Picture, shape: Picture) -> Picture:
+    """Return the set cells, and gaps between them that a shape does not fit into."""
+    side = max(shape.shape)
     # Beyond the picture nothing is set, which OpenCV takes for set when it erodes.
-    closed = cv2.morphologyEx(np.pad(picture, side), cv2.MORPH_CLOSE, box)
+    closed = cv2.morphologyEx(np.pad(picture, side), cv2.MORPH_CLOSE, shape)
     return np.asarray(closed[side:-side, side:-side], np.uint8)
 
 
