@@ -161,6 +161,7 @@ async def test_the_nearest_thing_that_was_only_reported_is_driven_to(tmp_path: P
         drive = await visit.report("navigate_to", place="nearest extinguisher")
         kit = await visit.report("navigate_to", place="first aid kit")
         several = await visit.ask("navigate_to", place="fire extinguisher")
+        use = await visit.ask("navigate_to", place="tool to put out a fire")
         forgotten = await visit.ask("forget", what="first-aid box")
     assert "not written down, the robot's detector reported it in P7 P6" in drive["place"]
     assert drive["reason"].endswith(") is 1.0 m from the robot.")
@@ -168,6 +169,7 @@ async def test_the_nearest_thing_that_was_only_reported_is_driven_to(tmp_path: P
     assert kit["state"] == "arrived"
     assert several.startswith("2 things that pictures show are called 'fire extinguisher'.")
     assert "or say 'nearest fire extinguisher'" in several
+    assert "If that is meant, use 'nearest fire extinguisher'." in use
     assert forgotten.startswith("Nothing is remembered as 'first-aid box'.")
 
 

@@ -14,6 +14,7 @@ from mapspeak.places.relations.grammar import Several, Superlative, parse_relati
 from mapspeak.places.relations.vocabulary import COUNTS, ORDERS, RANKS, Kind
 from mapspeak.spatial.rooms import RoomClass
 from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.reported import list_reported
 
 MOST_GUESSES = 3
 
@@ -51,7 +52,17 @@ def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
     guesses = _guess(world, wanted) if world.places and not IDS.fullmatch(wanted) else ()
     if guesses:
         return f"{_say_guesses(guesses)} {phrases}", NextStep.READ_MORE
+    if not IDS.fullmatch(wanted) and (shown := _find_reported(world, wanted)) is not None:
+        seen = f"Pictures show {quote_name(shown)}, which is not written down. If that is meant, "
+        return f"{seen}use {f'nearest {shown}'!r}. {phrases}", NextStep.READ_MORE
     return phrases, NextStep.SEE_PLACES
+
+
+def _find_reported(world: WorldModel, wanted: str) -> str | None:
+    """Return the label of what pictures show at known places and words may mean."""
+    index, labels = world.recollector.reports.index, list_reported(world.pictures)
+    meant = index.find_meant(wanted, labels)
+    return next((each for each in meant if world.join_reported([each])), None)
 
 
 def _say_ids(world: WorldModel, wanted: str) -> str:
