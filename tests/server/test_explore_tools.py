@@ -6,12 +6,16 @@ import pytest
 from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
+from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.exploration.explorer import Explorer
+from mapspeak.driving.exploration.progress import Bounds
 from mapspeak.errors import LinkError
 from mapspeak.evaluation.agents.driver import read_map_text
 from mapspeak.geometry import Pose
 from mapspeak.robot import CameraPicture, Detection
+from mapspeak.server.reports.exploring import ExploreAnswer
 from mapspeak.spatial import OccupancyGrid
-from roaming import RoamingRobot, world_from_text
+from roaming import RoamingRobot, session_of, world_from_text
 from served import connect, pictures_of, report_of, text_of
 
 pytestmark = pytest.mark.anyio
@@ -72,15 +76,22 @@ async def test_exploring_goes_on_from_call_to_call_until_nothing_is_left(tmp_pat
     assert answer["driven_m"] > 1.0
 
 
-async def test_the_frontier_under_way_comes_first_and_a_wait_that_was_cut_is_told(
-    tmp_path: Path,
-) -> None:
+async def test_the_frontier_under_way_comes_first(tmp_path: Path) -> None:
     robot = RoamingRobot(world_from_text(THREE_ROOMS, start=(5.0, 1.4)))
-    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
-        for _ in range(4):
-            answer = report_of(await client.call_tool("explore", {"wait_s": 1.0}))
-            if answer["state"] == "driving" and answer["next"].split(":")[0] in answer["frontiers"]:
-                assert answer["frontiers"][0] == answer["next"].split(":")[0]
+    explorer = Explorer(session_of(robot, tmp_path), pick=lambda frontiers, _: frontiers[-1])
+    progress = await explorer.advance(Bounds(), wait_s=0.1, on_trip=_no_news)
+    answer = ExploreAnswer.of(progress)
+    assert len(answer.frontiers) > 1
+    assert answer.frontiers[0] == answer.next.split(":")[0] != progress.frontiers[0].id
+
+
+async def _no_news(_report: DriveReport) -> None:
+    """Take no news."""
+
+
+async def test_a_wait_that_was_cut_is_told(tmp_path: Path) -> None:
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        await client.call_tool("turn", {"by_deg": 5})
         asked = await client.call_tool("wait_for_goal", {"wait_s": 60})
         within = await client.call_tool("wait_for_goal", {"wait_s": 25})
     assert "wait_s was cut to 25" in text_of(asked)

@@ -177,6 +177,9 @@ async def test_pictures_and_records_are_recalled_by_time_place_and_label(
         shown = await client.call_tool("recall_episodes", {"picture_of": picture_id})
         strange = await client.call_tool("recall_episodes", {"picture_of": "nobody"})
         wrong = await client.call_tool("recall_episodes", {"since": "some day"})
+    assert "| with picture P1" in next(
+        line for line in every.splitlines() if "quiet corner" in line
+    )
     assert every.startswith("3 observations")
     assert old.startswith("2 observations")
     assert ladder.startswith("1 observation;")

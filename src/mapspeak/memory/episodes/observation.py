@@ -187,9 +187,11 @@ class EpisodeMatch:
     near_id: str | None = None
     is_elsewhere: bool = False
 
-    def called(self, shown_id: str) -> "EpisodeMatch":
-        """Return the same under another id."""
-        return replace(self, observation=replace(self.observation, id=shown_id))
+    def with_picture(self, short: str) -> "EpisodeMatch":
+        """Return the same with its picture under a short id, which is that of a picture itself."""
+        seen = replace(self.observation, picture=short)
+        is_picture = seen.kind is ObservationKind.PICTURE
+        return replace(self, observation=replace(seen, id=short) if is_picture else seen)
 
 
 def placed(seen: Observation, placings: Iterable[MapPlacing] | None) -> EpisodeMatch:
@@ -227,10 +229,8 @@ def name_pictures(page: EpisodePage, ids: Mapping[str, str]) -> EpisodePage:
     """
 
     def name(match: EpisodeMatch) -> EpisodeMatch:
-        seen = match.observation
-        is_picture = seen.kind is ObservationKind.PICTURE
-        short = ids.get(seen.picture or "") if is_picture else None
-        return match if short is None else match.called(short)
+        short = ids.get(match.observation.picture or "")
+        return match if short is None else match.with_picture(short)
 
     anchor = None if page.anchor is None else name(page.anchor)
     return replace(page, matches=tuple(map(name, page.matches)), anchor=anchor)

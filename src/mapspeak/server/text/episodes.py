@@ -180,7 +180,8 @@ def say_episode(match: EpisodeMatch, *, now: datetime | None) -> str:
     if seen.labels:
         parts.append(f"saw {quote(', '.join(seen.labels), most=LONGEST_TEXT)}")
     if seen.picture and seen.kind is not ObservationKind.PICTURE:
-        parts.append("with a picture")
+        is_short = "." not in seen.picture
+        parts.append(f"with picture {seen.picture}" if is_short else "with a picture")
     if match.distance_m is not None:
         parts.append(f"{match.distance_m:.1f} m away")
     return " | ".join(filter(None, (*parts, say_evidence(match))))

@@ -366,7 +366,7 @@ class MemoryTools:
                 hint=lead("Call {recall_episodes} without picture_of for their ids."),
             )
         match = placed(seen, self._session.memory.place_maps())
-        match = match if taken is None else match.called(taken.id)
+        match = match if taken is None else match.with_picture(taken.id)
         said = say_episode(match, now=self._session.find_wall_time())
         path = await self._session.compute(lambda: store.picture_path(seen))
         if path is None:
