@@ -40,6 +40,6 @@ def test_where_no_door_is_passed_no_place_is_offered_that_does_not_work_either()
 
 def test_closed_floor_is_as_far_from_obstacles_as_it_was() -> None:
     world = world_on(revision_with(*BOTH))
-    told = describe_place(world, find_place(world, "12, 6.5"))
+    told = describe_place(world, find_place(world, "12, 6.5"), picture_ids={})
     assert "0.00 m from any obstacle" not in told
     assert "closed by event E2" in told

@@ -115,6 +115,11 @@ class PictureBook:
         return tuple(self._taken.values())
 
     @property
+    def short_ids(self) -> dict[str, str]:
+        """The short ids of those, by their names."""
+        return {each.name: each.id for each in self._taken.values()}
+
+    @property
     def half_view_rad(self) -> float:
         """Half the field of view of the camera that looks ahead, or of a common camera."""
         return find_half_view_rad(self._views)

@@ -14,6 +14,7 @@ from alignment_maps import HOUSE
 from fakes import FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, audit_of, make_guard
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.robot import Detection
 from mapspeak.spatial import OccupancyGrid
@@ -150,6 +151,31 @@ async def test_of_things_of_little_trust_it_is_said_why(tmp_path: Path) -> None:
         text = text_of(await client.call_tool("find_place", {"query": "fire extinguisher"}))
     (why,) = (line for line in text.splitlines() if line.startswith("Trust in T2: "))
     assert "behind a wall" in why
+
+
+async def test_a_picture_goes_by_one_id_in_all_answers(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.detections = (
+        Detection(label="ladder", bearing_rad=0.0, range_m=None, confidence_ratio=0.9),
+    )
+    guard = make_guard(tmp_path)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        taken = text_of(await client.call_tool("look_through_camera", {}))
+        unwritten = text_of(await client.call_tool("find_place", {"query": "ladder"}))
+        sink = {"label": "sink", "bearing_deg": 5, "range_m": 1.2}
+        place = {"name": "a", "description": "", "functional_landmarks": [sink]}
+        await client.call_tool("write_semantic_data", place)
+        found = report_of(await client.call_tool("find_place", {"query": "sink"}))
+        described = text_of(await client.call_tool("describe_place", {"place": "T1"}))
+        recalled = text_of(await client.call_tool("recall_episodes", {}))
+        shown = await client.call_tool("recall_episodes", {"picture_of": "P1"})
+    assert taken.startswith("Picture P1")
+    assert "(P1)" in unwritten
+    assert found["candidates"][0]["pictures"] == ["P1"]
+    assert "In the pictures P1." in described
+    assert "P1: picture at" in recalled
+    assert "with picture P1" in recalled
+    assert len(pictures_of(shown)) == 1
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -289,9 +315,17 @@ async def test_a_record_names_the_picture_file_that_is_kept(tmp_path: Path) -> N
     async with connect(FakeRobot(two_rooms()), tmp_path, guard=guard) as client:
         await client.call_tool("look_through_camera", {})
         await remember(client, {"name": "a", "description": "b", "functional_landmarks": ["sink"]})
+    store = SemanticMapStore(tmp_path / "semantic_map.yaml")
+    (place,) = store.read().waypoints
+    assert place.picture is not None
+    assert (memory_folder(store.path) / "pictures" / place.picture).is_file()
+    # Another server numbers its pictures anew, and calls this one by its file.
+    async with connect(FakeRobot(two_rooms()), tmp_path, guard=guard, toolsets=TOOLSETS) as client:
         found = report_of(await client.call_tool("find_place", {"query": "sink"}))
-    (name,) = found["candidates"][0]["pictures"]
-    assert (memory_folder(tmp_path / "semantic_map.yaml") / "pictures" / name).is_file()
+        (name,) = found["candidates"][0]["pictures"]
+        shown = await client.call_tool("recall_episodes", {"picture_of": name})
+    assert name == place.picture
+    assert len(pictures_of(shown)) == 1
 
 
 async def test_a_failing_disk_costs_the_episode_and_not_the_call(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """What a model reads of what is remembered."""
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Self
 
@@ -43,7 +44,14 @@ class CandidateReport(Report):
     trust_why: list[str] = Field(description="who saw it, then what speaks against it")
 
     @classmethod
-    def of(cls, candidate: RecallCandidate, *, near: Point | None, now: datetime | None) -> Self:
+    def of(
+        cls,
+        candidate: RecallCandidate,
+        *,
+        near: Point | None,
+        now: datetime | None,
+        picture_ids: Mapping[str, str],
+    ) -> Self:
         """Make the report of a candidate near to a point; ages are counted from `now`."""
         at, off_m, check = candidate.position, candidate.uncertainty_m, candidate.check
         return cls(
@@ -53,7 +61,7 @@ class CandidateReport(Report):
             score=1.0 if candidate.match is None else round(candidate.match.score_ratio, 2),
             why=say_evidence(candidate, near=near),
             seen_from=list(candidate.seen_from),
-            pictures=list(candidate.pictures),
+            pictures=[picture_ids.get(name, name) for name in candidate.pictures],
             position=None if at is None else [round(at.x, 2) + 0.0, round(at.y, 2) + 0.0],
             is_guessed=candidate.is_guessed,
             uncertainty_m=None if off_m is None else round(off_m, 2),
@@ -113,15 +121,23 @@ class RecallAnswer(Report):
     warnings: list[str]
 
     @classmethod
-    def of(cls, recalled: Recall, *, now: datetime | None, warnings: tuple[str, ...] = ()) -> Self:
-        """Make the report of an answer."""
+    def of(
+        cls,
+        recalled: Recall,
+        *,
+        now: datetime | None,
+        picture_ids: Mapping[str, str],
+        warnings: tuple[str, ...] = (),
+    ) -> Self:
+        """Make the report of an answer; pictures go by their short ids, by name, where known."""
         answer, near = recalled.answer, recalled.query.near
         limits = () if answer.limits is None else (answer.limits,)
         return cls(
             verdict=recalled.verdict,
             advice=say_advice(recalled),
             candidates=[
-                CandidateReport.of(each, near=near, now=now) for each in recalled.candidates
+                CandidateReport.of(each, near=near, now=now, picture_ids=picture_ids)
+                for each in recalled.candidates
             ],
             n_fitting=answer.n_meant,
             n_searched=recalled.n_searched,

@@ -190,8 +190,8 @@ class MemoryTools:
 
     def _find(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
         """Return what passes a query; a picture that is known by a short id goes by that."""
-        ids = {each.name: each.id for each in self._session.pictures.taken}
-        return name_pictures(self._find_in_rooms(query, world), ids)
+        page = self._find_in_rooms(query, world)
+        return name_pictures(page, self._session.pictures.short_ids)
 
     def _find_in_rooms(self, query: EpisodeQuery, world: WorldModel | None) -> EpisodePage:
         """Return the observations that pass a query, in the rooms of the map as it is now."""

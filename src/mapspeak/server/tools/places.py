@@ -79,7 +79,8 @@ class PlaceTools:
             if now is not None:
                 events = find_events_at(session.recall_events(), world, found, now)
                 noted = say_events(events, now)
-            return describe_place(world, found, noted=noted)
+            ids = session.pictures.short_ids
+            return describe_place(world, found, picture_ids=ids, noted=noted)
 
         return await session.compute(describe)
 
@@ -161,6 +162,7 @@ class FindTools:
         session = self._session
         now = session.find_wall_time()
         world = await session.fetch_world_model(needs_memory=True)
+        ids = session.pictures.short_ids
 
         def ask() -> RecallAnswer:
             words, room_id = split_room(world, name_room(world, query))
@@ -176,7 +178,7 @@ class FindTools:
             )
             answer = leave_out_beside(recall(world, wanted))
             warnings = self._say_warnings(world, query, now)
-            report = RecallAnswer.of(answer, now=now, warnings=warnings)
+            report = RecallAnswer.of(answer, now=now, picture_ids=ids, warnings=warnings)
             if now is None:
                 return report
             store, find = session.episodes.store, session.find_episodes

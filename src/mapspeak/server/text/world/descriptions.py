@@ -1,7 +1,7 @@
 """One place or thing in full, as text, with how far to trust what is remembered of it."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from mapspeak.memory import Landmark, group_views
 from mapspeak.memory.consistency.findings import Trust
@@ -63,7 +63,9 @@ def say_landmark(landmark: Landmark) -> str:
     return ", ".join(parts)
 
 
-def thing_lines(world: WorldModel, remembered: RememberedThing) -> Iterator[str]:
+def thing_lines(
+    world: WorldModel, remembered: RememberedThing, picture_ids: Mapping[str, str]
+) -> Iterator[str]:
     """Return all that is known of a thing, a fact on each line."""
     thing, candidate = remembered.thing, describe_candidate(world, remembered)
     label = quote(thing.label)
@@ -84,7 +86,8 @@ def thing_lines(world: WorldModel, remembered: RememberedThing) -> Iterator[str]
     yield from _view_lines(world, remembered)
     yield from _trust_lines(candidate.trust)
     if candidate.pictures:
-        names = ", ".join(map(tell_name, candidate.pictures[:MOST_VIEWS]))
+        pictures = (picture_ids.get(each, each) for each in candidate.pictures[:MOST_VIEWS])
+        names = ", ".join(map(tell_name, pictures))
         yield lead(
             "In the pictures {names}. {recall_episodes} with picture_of shows one.", names=names
         )
@@ -162,10 +165,17 @@ NEAR_M = 5.0
 MOST_NEAR = 6
 
 
-def describe_place(world: WorldModel, place: Place, *, noted: Sequence[str] = ()) -> str:
+def describe_place(
+    world: WorldModel,
+    place: Place,
+    *,
+    picture_ids: Mapping[str, str],
+    noted: Sequence[str] = (),
+) -> str:
     """Return all that is known of a place, a fact on each line.
 
     Args:
+        picture_ids: The short ids that pictures go by, by their names.
         noted: The events there, in words.
     """
     goal = check_place(world, place)
@@ -179,7 +189,7 @@ def describe_place(world: WorldModel, place: Place, *, noted: Sequence[str] = ()
         case RememberedPlace() as remembered:
             lines = _remembered_lines(world, remembered)
         case RememberedThing() as thing:
-            lines = thing_lines(world, thing)
+            lines = thing_lines(world, thing, picture_ids)
         case _:
             lines = _spot_lines(world, place)
     is_told = isinstance(place.thing, RememberedThing) and place.name == place.thing.id
