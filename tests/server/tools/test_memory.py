@@ -170,7 +170,7 @@ async def test_a_picture_goes_by_one_id_in_all_answers(tmp_path: Path) -> None:
         recalled = text_of(await client.call_tool("recall_episodes", {}))
         shown = await client.call_tool("recall_episodes", {"picture_of": "P1"})
     assert taken.startswith("Picture P1")
-    assert "(P1)" in unwritten
+    assert "P1" in unwritten
     assert found["candidates"][0]["pictures"] == ["P1"]
     assert "In the pictures P1." in described
     assert "P1: picture at" in recalled
