@@ -166,18 +166,9 @@ MOST_NEAR = 6
 
 
 def describe_place(
-    world: WorldModel,
-    place: Place,
-    *,
-    picture_ids: Mapping[str, str],
-    noted: Sequence[str] = (),
+    world: WorldModel, place: Place, *, picture_ids: Mapping[str, str], noted: Sequence[str] = ()
 ) -> str:
-    """Return all that is known of a place, a fact on each line.
-
-    Args:
-        picture_ids: The short ids that pictures go by, by their names.
-        noted: The events there, in words.
-    """
+    """Return all that is known of a place, with the events noted there, a fact on each line."""
     goal = check_place(world, place)
     match place.thing:
         case Region() as region:
@@ -373,11 +364,10 @@ def describe_view(world: WorldModel, place: Place, picture: CameraPicture) -> st
         lines += [_say_sight(each, picture, half_view_rad) for each in sights[:MOST_SIGHTS]]
     else:
         lines.append(f"No door and no remembered thing within {SIGHT_M:.0f} m should be in it.")
-    match place.thing:
-        case RememberedThing() as thing:
-            is_told = thing.thing.position is None or thing.id in {each.id for each in sights}
-            lines += [] if is_told else [f"{say_off(picture.pose.point, thing)}."]
-            lines.append(lead(CHECK))
+    if isinstance(thing := place.thing, RememberedThing):
+        is_told = thing.thing.position is None or thing.id in {each.id for each in sights}
+        lines += [] if is_told else [f"{say_off(picture.pose.point, thing)}."]
+        lines.append(lead(CHECK))
     return "\n".join(filter(None, lines))
 
 
