@@ -35,6 +35,7 @@ class NextStep(StrEnum):
     USE_OTHER_TOOLS = "use_other_tools"
     BEGIN_ROUTE = "begin_route"
     ALIGN = "align"
+    END_EVENT = "end_event"
 
 
 def say_cause(error: Exception) -> str:

@@ -5,11 +5,11 @@ import pytest
 from closing import RADIUS_M, event, revision_with, world_on
 from drawing import grid_from_text
 from guarding import corners
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import Effect
-from mapspeak.places.relations.choosing import find_place
+from mapspeak.places.relations.choosing import choose_goal, find_place
 from mapspeak.server.text.world.descriptions import describe_place
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel
@@ -36,6 +36,24 @@ def test_where_no_door_is_passed_no_place_is_offered_that_does_not_work_either()
     with pytest.raises(GoalError, match="gets through no door") as caught:
         find_place(world, f"{far.id} looking back through its door")
     assert far.id not in caught.value.hint
+
+
+def test_a_room_that_is_cut_off_names_what_closes_it_and_no_pose_behind_its_wall() -> None:
+    world = world_on(revision_with(*BOTH))
+    east = max(world.rooms.regions, key=lambda each: each.widest.x)
+    with pytest.raises(GoalError, match="closed by event E") as caught:
+        choose_goal(world, place=east.id, x=None, y=None, yaw_deg=None)
+    assert caught.value.step is NextStep.END_EVENT
+    assert "nearest pose" not in caught.value.hint
+
+
+def test_no_pose_on_the_other_side_of_a_wall_is_offered() -> None:
+    text = "\n".join(["############", *["#....#.....#"] * 5, "############"])
+    drawn = grid_from_text(text, resolution_m=1.0)
+    world = WorldModel(drawn, Pose(2.0, 3.0), SemanticMap(), radius_m=RADIUS_M)
+    with pytest.raises(GoalError) as caught:
+        choose_goal(world, place=None, x=7.5, y=3.5, yaw_deg=None)
+    assert "nearest pose" not in caught.value.hint
 
 
 def test_closed_floor_is_as_far_from_obstacles_as_it_was() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from mapspeak.errors import NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
+from mapspeak.spatial.fieldofview import is_in_sight
 from mapspeak.spatial.paths import DistanceField, distances_from
 from mapspeak.worldmodel.keepout import MARGIN_M, ClosedArea, ClosedFloor
 
@@ -44,6 +45,7 @@ class GoalCheck:
         areas: The closed areas in the way: the one that the goal is in or too near to, the one
             that the robot stands in, or those on the shortest way.
         is_robot_inside: The robot itself stands in the closed area.
+        is_nearest_apart: The goal has free floor, and a wall hides it from the nearest pose.
     """
 
     verdict: GoalVerdict
@@ -55,6 +57,7 @@ class GoalCheck:
     bounds: tuple[Point, Point] | None = None
     areas: tuple[ClosedArea, ...] = ()
     is_robot_inside: bool = False
+    is_nearest_apart: bool = False
 
     @property
     def is_ok(self) -> bool:
@@ -94,7 +97,13 @@ def check_goal(
     check = judge_goal(grid, distances, goal, opened=opened)
     if check.is_ok or check.verdict is GoalVerdict.NOT_FINITE:
         return check
-    return replace(check, nearest=_find_nearest(grid, distances, goal))
+    nearest = _find_nearest(grid, distances, goal)
+    is_apart = (
+        check.verdict is GoalVerdict.UNREACHABLE
+        and nearest is not None
+        and not is_in_sight(grid, nearest.point, goal.point, own_m=0.0)
+    )
+    return replace(check, nearest=nearest, is_nearest_apart=is_apart)
 
 
 def judge_goal(
@@ -281,13 +290,20 @@ def say_instead(check: GoalCheck, *, has_heading: bool = False) -> tuple[str, Ne
     Args:
         has_heading: The heading was asked for, so it is said too.
     """
+    if check.verdict is GoalVerdict.UNREACHABLE and check.areas:
+        return _say_wait(check.areas[0])
     near = check.nearest
-    if near is None:
+    if near is None or check.is_nearest_apart:
         return "No place near it works either.", NextStep.CHOOSE_ON_MAP
     heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
     off_m = near.point.distance_to(check.goal.point)
     at = f"x={near.x:.2f}, y={near.y:.2f}{heading}, {off_m:.1f} m off"
     return f"The nearest pose that works is {at}.", NextStep.DRIVE_THERE
+
+
+def _say_wait(area: ClosedArea) -> tuple[str, NextStep]:
+    hint = f"Wait until {area.until}." if area.until else "It cannot be reached for now."
+    return hint, NextStep.END_EVENT if area.event_id else NextStep.CHOOSE_ON_MAP
 
 
 def say_check(check: GoalCheck) -> str:

@@ -230,10 +230,11 @@ async def test_many_observations_are_summed_up_before_they_are_listed(tmp_path: 
         told = text_of(await client.call_tool("recall_episodes", {"since": "this afternoon"}))
         rest = text_of(await client.call_tool("recall_episodes", {"from_row": 20}))
         none = text_of(await client.call_tool("recall_episodes", {"since": "yesterday"}))
-    count, rooms, seen, *rows = told.splitlines()
+    count, seen, rooms, *rows = told.splitlines()
     assert count.startswith("24 observations; showing 20.")
-    assert rooms == "By room: R2: 14 pictures, 12:00 to 12:13; R1: 10 pictures, 12:14 to 12:23."
-    assert seen == 'Seen last: "red ladder" 12:03 from R2.'
+    by_room = "R2: 14 pictures, 12:00 to 12:13; R1: 10 pictures, 12:14 to 12:23."
+    assert rooms == f"By room of the robot: {by_room}"
+    assert seen == 'By label: "red ladder" 1, last 12:03 from R2.'
     assert len(rows) == 2, "pictures of which nothing was noted share a line"
     assert rows[0].count(" in R1;") == 10
     assert "red ladder" in rest
@@ -626,7 +627,7 @@ async def test_events_are_kept_as_notes_and_end_once(tmp_path: Path, mode: str) 
     assert "E1 had already ended" in text_of(again)
     assert notes.startswith("2 observations")
     assert "\"Noted E1 'wet floor' (R1), closed to the robot, until 14:00.\"" in notes
-    assert "\"Ended E1 'wet floor' (R1)" in notes
+    assert "\"Ended E1 'wet floor'.\"" in notes
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -244,16 +244,16 @@ async def test_where_a_thing_was_seen_is_its_own_room_and_near_is_near_to_it(
     async with visiting(tmp_path) as visit:
         later = await visit.ask("recall_episodes", near_seen="extinguisher")
     assert "Near to where this was made, not to what it shows: o" in later
-    last = next(line for line in told.splitlines() if line.startswith("Seen last: "))
-    assert room_said(last, "fire extinguisher, cone") == "in R1"
+    last = next(line for line in told.splitlines() if line.startswith("By label: "))
+    assert room_said(last, "fire extinguisher") == room_said(last, "cone") == "in R1"
     assert room_said(last, "poster") == "from R2"
     assert "Things nearest to it: " in near
     assert '"cone" in R1, in P' in near
 
 
-def room_said(line: str, labels: str) -> str:
-    """Return the room with which the summary names some labels."""
-    return " ".join(line.partition(f'"{labels}" ')[2].partition(";")[0].strip(".").split()[-2:])
+def room_said(line: str, label: str) -> str:
+    """Return the room with which the summary names a label."""
+    return " ".join(line.partition(f'"{label}" ')[2].partition(";")[0].strip(".").split()[-2:])
 
 
 async def test_a_room_tells_what_pictures_show_in_it(tmp_path: Path) -> None:

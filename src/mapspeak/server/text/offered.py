@@ -78,6 +78,9 @@ STEPS = {
     NextStep.DRIVE_ROUND: "{hint}. {navigate_to} leads round.",
     NextStep.USE_OTHER_TOOLS: "To drive use {navigate_to}. To stop use {stop_robot}. {hint}.",
     NextStep.BEGIN_ROUTE: "Call {follow_route} with its stops.",
+    NextStep.END_EVENT: (
+        "{hint}. {end_event} ends an event that is over. {look_at_map} shows other places."
+    ),
     NextStep.ALIGN: "{hint}. {realign_memory} finds out how the maps lie.",
 }
 """What is said in place of a hint in plain words, with or without it."""

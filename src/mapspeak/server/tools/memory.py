@@ -303,7 +303,7 @@ class MemoryTools:
             return f"Ended: {said}"
 
         def tell() -> str:
-            fault = self._keep_note(world, f"Ended {said}")
+            fault = self._keep_note(world, f"Ended {ended.told_title}.")
             return " ".join(filter(None, (said, say_also_closed(world, ended, now), fault)))
 
         return f"Ended: {await session.compute(tell)}"

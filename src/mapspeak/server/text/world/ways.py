@@ -29,10 +29,13 @@ from mapspeak.worldmodel.remembered import RememberedThing
 OF_THINGS = "Straight is to a thing itself, the path to where the robot would stand to see it."
 MOST_LINES = 12
 BORDERS = "borders with the unknown not offered"
-NOTHING = (
-    "Nothing is known to be blocked: the robot gets to every room, door and remembered place, and "
-    "no drive has failed."
+FAILED = "goals that failed"
+MINOR = {BORDERS, FAILED}
+"""What keeps the robot from no known place."""
+EVERYWHERE = (
+    "Nothing is known to be blocked: the robot gets to every room, door and remembered place."
 )
+NOTHING = f"{EVERYWHERE} No drive has failed."
 MOST_WAYS = 30
 MOST_SIZES = 60
 MOST_REASONS = 6
@@ -61,17 +64,24 @@ def describe_blocked(
         "rooms without a way": list(_say_rooms(world)),
         "remembered places without a way": list(_say_places(world)),
         BORDERS: list(_say_borders(world)),
-        "goals that failed": [_say_drive(drive, now_s) for drive in failed],
+        FAILED: [_say_drive(drive, now_s) for drive in failed],
     }
     known = {what: lines for what, lines in parts.items() if lines}
-    n_borders = len(find_refused(world))
-    counted = ", ".join(
-        f"{what} ({n_borders if what == BORDERS else len(lines)})" for what, lines in known.items()
-    )
+    counts = {what: len(lines) for what, lines in known.items()}
+    if BORDERS in counts:
+        counts[BORDERS] = len(find_refused(world))
     lines = list(_say_doubts(world, events, now))
     lines += [f"The robot is held, so it drives nowhere: {shorten(held_by)}."] if held_by else []
-    lines += [f"In the way: {counted}." if known else NOTHING]
+    lines.append(_say_in_the_way(counts))
     return "\n\n".join(["\n".join(lines), *(_section(*part) for part in known.items())])
+
+
+def _say_in_the_way(counts: Mapping[str, int]) -> str:
+    """Say first whether the robot gets everywhere; how often what is by the way."""
+    if not counts:
+        return NOTHING
+    told = ", ".join(f"{what} ({n})" for what, n in counts.items())
+    return f"{EVERYWHERE} Else: {told}." if counts.keys() <= MINOR else f"In the way: {told}."
 
 
 def _say_doubts(world: WorldModel, events: Sequence[Event], now: datetime | None) -> Iterator[str]:
