@@ -142,6 +142,27 @@ def test_a_kind_of_thing_that_is_not_remembered_is_said_to_be_missing() -> None:
     assert ids(answer) == ["d"]
 
 
+def test_without_a_model_the_words_of_common_knowledge_tell_what_is_missing() -> None:
+    dryer = Entry(id="d", kind=EntryKind.THING, name="hand dryer")
+
+    answer = EntryIndex([dryer]).find("where can I dry my wet hair after swimming")
+
+    assert (answer.verdict, answer.missing) == (Verdict.NOT_REMEMBERED, "hair dryer")
+
+
+def test_words_that_agree_in_more_of_a_request_make_surer() -> None:
+    things = ("workbench", "sofa", "sink", "clock")
+    index = EntryIndex([Entry(id=each, kind=EntryKind.THING, name=each) for each in things])
+
+    short, long = (
+        index.find("relaxing"),
+        index.find("stretching out for a nap in the evening, relaxing"),
+    )
+
+    assert (short.verdict, long.verdict) == (Verdict.UNSURE, Verdict.FOUND)
+    assert ids(long)[0] == "sofa"
+
+
 def test_a_kind_of_thing_that_only_a_description_names_is_remembered() -> None:
     kitchen = Entry(
         id="k", kind=EntryKind.PLACE, name="far end", description="A fridge hums there."
@@ -227,8 +248,8 @@ def test_the_nearest_text_may_be_a_sentence_of_the_description() -> None:
 
 
 def test_without_a_model_only_words_are_found_and_the_answer_says_so() -> None:
-    assert by_words("I have to climb").verdict is Verdict.NOT_REMEMBERED
-    assert by_words("I have to climb").limits == WORDS_ONLY
+    assert by_words("I have to clamber").verdict is Verdict.NOT_REMEMBERED
+    assert by_words("I have to clamber").limits == WORDS_ONLY
     assert by_meaning("I have to climb").limits is None
 
 

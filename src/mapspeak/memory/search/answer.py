@@ -201,10 +201,14 @@ class Chance:
     lead: float = 0.0
     missing: float
 
-    def ratio(self, likeness: float, lead: float, missing: float) -> float:
-        """Return the probability; a missing kind that is much less like counts for nothing more."""
+    def ratio(self, likeness: float, lead: float, missing: float, *, n_words: int = 1) -> float:
+        """Return the probability; a missing kind that is much less like counts for nothing more.
+
+        Args:
+            n_words: How many words each tell so much: what agrees in four says more than in one.
+        """
         terms = self.likeness * likeness + self.lead * lead + self.missing * max(missing, -1.0)
-        return 1.0 / (1.0 + math.exp(-(self.constant + terms)))
+        return 1.0 / (1.0 + math.exp(-(self.constant + n_words * terms)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,31 +218,33 @@ class Thresholds:
     Attributes:
         least_ratio: Similarity from which a text is about a phrase.
         same_ratio: Scores no further apart count as equal.
+        sure_ratio: The first candidate is said to be the one meant where it is so likely.
         right: How likely the first candidate is what is meant.
         there: How likely what is meant is remembered at all.
     """
 
     least_ratio: float
     same_ratio: float
+    sure_ratio: float
     right: Chance
     there: Chance
 
 
-SURE_RATIO = 0.93
-"""The first candidate is said to be the one meant where it is so likely."""
 REMEMBERED_RATIO = 0.65
 """A request is said not to be remembered where it is less likely."""
 WORD_THRESHOLDS = Thresholds(
     least_ratio=0.05,
     same_ratio=0.02,
-    right=Chance(constant=-4.1, likeness=3.09, lead=5.71, missing=-2.97),
-    there=Chance(constant=-2.86, likeness=6.22, missing=-2.97),
+    sure_ratio=0.88,
+    right=Chance(constant=-1.12, likeness=0.67, lead=3.05, missing=-1.88),
+    there=Chance(constant=0.46, likeness=2.01, missing=-3.01),
 )
 MINILM_THRESHOLDS = Thresholds(
     least_ratio=0.25,
     same_ratio=0.05,
-    right=Chance(constant=-1.29, likeness=2.09, lead=7.3, missing=-8.28),
-    there=Chance(constant=0.63, likeness=2.65, missing=-13.45),
+    sure_ratio=0.93,
+    right=Chance(constant=-1.3, likeness=3.11, lead=4.84, missing=-7.26),
+    there=Chance(constant=0.48, likeness=2.98, missing=-10.07),
 )
 """Fitted to the requests for tuning; benchmarks/requests/README.md says how."""
 

@@ -19,7 +19,6 @@ import numpy as np
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import (
     REMEMBERED_RATIO,
-    SURE_RATIO,
     WHOLE_WORD_WEIGHTS,
     WORD_THRESHOLDS,
     Answer,
@@ -67,6 +66,9 @@ Of the requests for tuning all misspelt names are at least .75 like the right on
 with unknown words at most .69 like any.
 """
 
+
+_MOST_COUNTED = 6
+"""Words of a longer request do not each tell something else."""
 
 _CONTENT = attrgetter(*(field.name for field in fields(Entry) if field.name != "id"))
 
@@ -258,7 +260,9 @@ class EntryIndex:
                 ratios = np.maximum(
                     ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS, size=size)
                 )
-                missing = self._kinds.find_missing_called(understood)
+                missing = self._kinds.find_missing_called(
+                    understood
+                ) or self._kinds.find_missing_said(understood)
         else:
             vector = self.vectors.embedder.embed([understood])[0].astype(np.float64)
             part_ratios, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
@@ -298,10 +302,16 @@ class EntryIndex:
         is_sure = likeness >= _SAME_KIND
         if not is_sure:
             lead = self._lead_ratio(asked.ratios, first)
-            if self._thresholds.there.ratio(likeness, lead, missing) < REMEMBERED_RATIO:
+            n_words = 1 if self._meanings else min(len(asked.words), _MOST_COUNTED)
+            there, right = (
+                chance.ratio(likeness, lead, missing, n_words=n_words)
+                for chance in (self._thresholds.there, self._thresholds.right)
+            )
+            if there < REMEMBERED_RATIO:
                 return Verdict.NOT_REMEMBERED, False
-            is_right = self._thresholds.right.ratio(likeness, lead, missing) >= SURE_RATIO
-            is_sure = is_right and not self._is_beside(asked.request, first)
+            is_sure = right >= self._thresholds.sure_ratio and not self._is_beside(
+                asked.request, first
+            )
         if not is_sure:
             return Verdict.UNSURE, False
         return Verdict.FOUND if n_meant == 1 else Verdict.SEVERAL, True

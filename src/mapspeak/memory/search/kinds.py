@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from mapspeak.memory.policy import find_head, words_of
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.search.answer import Entry, EntryKind, MatchField
+from mapspeak.memory.search.answer import WHOLE_WORD_WEIGHTS, Entry, EntryKind, MatchField
 from mapspeak.memory.search.meaningindex import LESS_FOR_COMMON, TextVectors
 from mapspeak.memory.search.wordindex import (
     MOST_KEPT,
     Texts,
+    WordIndex,
     content_stems,
     split_words,
     without_endings,
@@ -181,6 +182,10 @@ class KindIndex:
         self._n_known: dict[ThingKind, int] = {}
         self._absent: NDArray[np.bool_] | None = None
         self._said_of: dict[tuple[str, ...], Texts] = {}
+        self._words = WordIndex() if vectors is None else None
+        if self._words is not None:
+            for number, kind in enumerate(read_kinds()):
+                self._words.add(number, _texts_of(kind))
 
     def add(self, entries: Sequence[Entry]) -> None:
         """Count the kinds of entries as remembered."""
@@ -250,6 +255,18 @@ class KindIndex:
         number = int(np.where(absent, ratios, -1.0).argmax())
         return self._kinds[number].names[0], float(ratios[number])
 
+    def find_missing_said(self, request: str) -> tuple[str, float] | None:
+        """Find the kind that is not remembered and says most of a request by its names and uses."""
+        if any(self._n_known.get(kind) for kind in find_kinds_called(request)):
+            return None
+        assert self._words is not None, "without a model words are compared"  # noqa: S101 - so
+        kinds = read_kinds()
+        asked = self._words.ask(request)
+        ratios = self._words.score_ratios(asked, WHOLE_WORD_WEIGHTS, size=len(kinds))
+        is_absent = [not self._n_known.get(kind) for kind in kinds]
+        number = int(np.where(is_absent, ratios, 0.0).argmax())
+        return (kinds[number].names[0], float(ratios[number])) if ratios[number] > 0 else None
+
     def find_missing_called(self, request: str) -> tuple[str, float] | None:
         """Find the kind that a request names and nothing else, if it is not remembered."""
         stems = content_stems(request)
@@ -276,6 +293,13 @@ class KindIndex:
                 number = int(own.argmax())
                 if own[number] >= _SAME_KIND_RATIO:
                     self._kinds_of[label] = (self._kinds[number],)
+
+
+def _texts_of(kind: ThingKind) -> Texts:
+    return (
+        *((MatchField.OTHER_NAME, name) for name in kind.names),
+        *((MatchField.USE, use) for use in kind.uses),
+    )
 
 
 def is_carrier(label: str) -> bool:
