@@ -150,6 +150,15 @@ def test_without_a_model_the_words_of_common_knowledge_tell_what_is_missing() ->
     assert (answer.verdict, answer.missing) == (Verdict.NOT_REMEMBERED, "hair dryer")
 
 
+def test_a_word_is_no_form_of_another_that_ends_in_e() -> None:
+    desk = Entry(id="d", kind=EntryKind.THING, name="desk")
+
+    answer = EntryIndex([desk]).find("where can I sit")
+
+    assert answer.missing != "floor plan"
+    assert answer.verdict is Verdict.UNSURE
+
+
 def test_words_that_agree_in_more_of_a_request_make_surer() -> None:
     things = ("workbench", "sofa", "sink", "clock")
     index = EntryIndex([Entry(id=each, kind=EntryKind.THING, name=each) for each in things])

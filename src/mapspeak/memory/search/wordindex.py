@@ -183,7 +183,10 @@ class Vocabulary:
 
     def find_spellings(self, word: str) -> dict[str, MatchKind]:
         """Find the words that count as this one, each with the kind of match."""
-        found = dict.fromkeys(self._of_stem.get(stem(word), ()), MatchKind.FORM)
+        # To sit on no site: who strips an e for "using" finds other words, too.
+        strangers = (word + "e", word.removesuffix("e") if word.endswith("e") else "")
+        alike = (each for each in self._of_stem.get(stem(word), ()) if each not in strangers)
+        found = dict.fromkeys(alike, MatchKind.FORM)
         if word in found:
             found[word] = MatchKind.SAME
         found = dict.fromkeys(self._parts(stem(word)), MatchKind.PART) | found
