@@ -36,7 +36,8 @@ def find_rooms_of_things(
     Args:
         matches: The observation that shows a thing of each label.
     """
-    ids = {each.name: each.id for each in world.pictures}
+    # An observation calls its picture by its name, or by its short id.
+    ids = {key: each.id for each in world.pictures for key in (each.name, each.id)}
     shown = {
         label: ids[match.observation.picture]
         for label, match in matches.items()
