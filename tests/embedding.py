@@ -30,7 +30,6 @@ class ConceptEmbedder:
     thresholds = Thresholds(
         least_ratio=0.3,
         same_ratio=0.02,
-        sure_ratio=0.93,
         right=Chance(constant=-16.0, likeness=20.0, lead=20.0, missing=0.0),
         there=Chance(constant=-5.4, likeness=20.0, missing=-10.0),
     )

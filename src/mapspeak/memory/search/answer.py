@@ -218,31 +218,29 @@ class Thresholds:
     Attributes:
         least_ratio: Similarity from which a text is about a phrase.
         same_ratio: Scores no further apart count as equal.
-        sure_ratio: The first candidate is said to be the one meant where it is so likely.
         right: How likely the first candidate is what is meant.
         there: How likely what is meant is remembered at all.
     """
 
     least_ratio: float
     same_ratio: float
-    sure_ratio: float
     right: Chance
     there: Chance
 
 
+SURE_RATIO = 0.93
+"""The first candidate is said to be the one meant where it is so likely."""
 REMEMBERED_RATIO = 0.65
 """A request is said not to be remembered where it is less likely."""
 WORD_THRESHOLDS = Thresholds(
     least_ratio=0.05,
     same_ratio=0.02,
-    sure_ratio=0.88,
     right=Chance(constant=-1.12, likeness=0.67, lead=3.05, missing=-1.88),
     there=Chance(constant=0.46, likeness=2.01, missing=-3.01),
 )
 MINILM_THRESHOLDS = Thresholds(
     least_ratio=0.25,
     same_ratio=0.05,
-    sure_ratio=0.93,
     right=Chance(constant=-1.3, likeness=3.11, lead=4.84, missing=-7.26),
     there=Chance(constant=0.48, likeness=2.98, missing=-10.07),
 )

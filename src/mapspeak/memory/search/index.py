@@ -19,6 +19,7 @@ import numpy as np
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import (
     REMEMBERED_RATIO,
+    SURE_RATIO,
     WHOLE_WORD_WEIGHTS,
     WORD_THRESHOLDS,
     Answer,
@@ -309,7 +310,7 @@ class EntryIndex:
             )
             if there < REMEMBERED_RATIO:
                 return Verdict.NOT_REMEMBERED, False
-            is_sure = right >= self._thresholds.sure_ratio and not self._is_beside(
+            is_sure = right >= SURE_RATIO and not self._is_beside(
                 asked.request, first
             )
         if not is_sure:
