@@ -310,9 +310,7 @@ class EntryIndex:
             )
             if there < REMEMBERED_RATIO:
                 return Verdict.NOT_REMEMBERED, False
-            is_sure = right >= SURE_RATIO and not self._is_beside(
-                asked.request, first
-            )
+            is_sure = right >= SURE_RATIO and not self._is_beside(asked.request, first)
         if not is_sure:
             return Verdict.UNSURE, False
         return Verdict.FOUND if n_meant == 1 else Verdict.SEVERAL, True
