@@ -79,6 +79,7 @@ class FakeRobot:
         self.grid = grid
         self.pose = pose
         self.cameras: tuple[str, ...] = ("front",) if has_camera else ()
+        self.picture_size = (64, 48)
         self.is_radius_assumed = False
         self.detections: tuple[Detection, ...] = ()
         self.scan: RangeScan | None = None
@@ -132,12 +133,12 @@ class FakeRobot:
             raise LinkError("This robot has no camera.", hint="Use look_at_map instead.")
         is_ahead = camera is None or self.description.find_camera(camera) == self.cameras[0]
         encoded = io.BytesIO()
-        Image.new("RGB", (64, 48), "grey").save(encoded, format="JPEG")
+        Image.new("RGB", self.picture_size, "grey").save(encoded, format="JPEG")
         return CameraPicture(
             data=encoded.getvalue(),
             media_type="image/jpeg",
-            width_px=64,
-            height_px=48,
+            width_px=self.picture_size[0],
+            height_px=self.picture_size[1],
             horizontal_fov_rad=math.radians(90 if is_ahead else 60),
             pose=self.pose if is_ahead else self.pose @ Pose(0.0, 0.0, math.pi),
             stamp_s=self._now_s,

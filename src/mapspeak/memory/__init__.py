@@ -3,6 +3,7 @@
 from mapspeak.memory.laserfan import LaserFan, LaserRing, build_ring
 from mapspeak.memory.merging import (
     SAME_SPOT_M,
+    SAME_VIEW_RAD,
     Merge,
     Reunion,
     group_views,
@@ -28,6 +29,7 @@ from mapspeak.memory.waypoint import Confidence, Landmark, SemanticMap, Waypoint
 __all__ = [
     "LEFT_OUT",
     "SAME_SPOT_M",
+    "SAME_VIEW_RAD",
     "Concern",
     "Confidence",
     "Landmark",

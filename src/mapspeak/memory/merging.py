@@ -22,6 +22,8 @@ SAME_RANGE_RATIO = 0.5
 """Ranges of one thing differ by less than this share of the longer one."""
 SAME_SPOT_M = 0.5
 """Moving by less changes the bearing of a thing 3 m away by under 10 degrees."""
+SAME_VIEW_RAD = math.radians(15.0)
+"""A picture of a heading that much off still shows nearly all that is seen along the other."""
 SAME_POSE_M = 0.05
 """A pose nearer than this is the same one, estimated again."""
 LEAST_HALF_VIEW_RAD = math.radians(27.0)

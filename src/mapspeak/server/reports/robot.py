@@ -257,11 +257,19 @@ class MemoryAnswer(Report):
     warnings: list[str]
 
     @classmethod
-    def of(cls, memory: SemanticMap, name: str | None, *, first: int = 0) -> Self:
+    def of(
+        cls,
+        memory: SemanticMap,
+        name: str | None,
+        *,
+        first: int = 0,
+        advice: Sequence[str] = (),
+    ) -> Self:
         """Make the report of a page of all places, or of the one of that name or id.
 
         Args:
             first: The number of the place to begin with.
+            advice: What else is to be said.
 
         Raises:
             SemanticMapError: There is no such place.
@@ -280,7 +288,7 @@ class MemoryAnswer(Report):
                 f"No place called {name[:80]!r} is remembered.",
                 hint=f"Remembered are {known or 'no places yet'}; without a name all are given.",
             )
-        return cls.of_places(memory, shown, first=first)
+        return cls.of_places(memory, shown, first=first, advice=advice)
 
     @classmethod
     def of_places(
@@ -319,6 +327,7 @@ class WriteAnswer(Report):
     refused: list[str] = Field(description="what stays out, and why")
     n_places: int = Field(description="remembered in all")
     warnings: list[str]
+    others: list[str] = Field(description="what became of each of more")
 
     @classmethod
     def of(
@@ -344,7 +353,14 @@ class WriteAnswer(Report):
             refused=list(refused),
             n_places=len(memory.waypoints),
             warnings=list(warnings),
+            others=[],
         )
+
+    def line(self, name: str) -> str:
+        """Say in short what became of one of several places that were written at once."""
+        parts = [f"{self.id} {quote_name(name)} from {self.seen_from}", *self.landmarks]
+        parts += [f"left out {each}" for each in self.refused]
+        return "; ".join([*parts, *self.warnings])
 
 
 def _is_called(place: RememberedPlace, name: str) -> bool:

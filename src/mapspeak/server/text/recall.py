@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import Point
+from mapspeak.memory import PictureBook
 from mapspeak.memory.quoting import name_key, quote, quote_name
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.memory.store.forgetting import Forgotten
@@ -12,6 +13,7 @@ from mapspeak.places.asking import Recall
 from mapspeak.places.candidate import RecallCandidate, RecallDoubt
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
+from mapspeak.places.recall.undescribed import UndescribedPicture
 from mapspeak.server.text.findings import say_guess
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import list_some, say_count
@@ -19,6 +21,11 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace
 
 LONGEST_QUOTE = 120
+MOST_PICTURES_NAMED = 12
+DESCRIBE = (
+    "{write_semantic_data} takes many at once, in more. {recall_episodes} with picture_of "
+    "undescribed shows them."
+)
 MOST_LEFT_NAMED = 100
 LOOK_FOR = "Look for it with {search_for}."
 OTHERWISE = "Else see why the others are listed, or say it in other words."
@@ -194,6 +201,31 @@ def say_places_left(left: Sequence[RememberedPlace], *, first: int) -> Iterator[
     named = [f"{each.id} {quote_name(each.waypoint.name)}" for each in left]
     told = list_some(named, most=MOST_LEFT_NAMED)
     yield f"{len(left)} left out, from_row={first} goes on: {told}."
+
+
+def say_undescribed(
+    pictures: Sequence[UndescribedPicture], book: PictureBook, *, most: int = MOST_PICTURES_NAMED
+) -> list[str]:
+    """Offer the pictures that nothing was written of, to be described in one call."""
+    if not pictures:
+        return []
+    named = [say_picture(each, book) for each in pictures[:most]]
+    if named and len(pictures) > most:
+        named.append(f"and {len(pictures) - most} more")
+    said = f"{say_count(len(pictures), 'picture')} without words"
+    return [f"{': '.join(filter(None, (said, '; '.join(named))))}. {lead(DESCRIBE)}".rstrip()]
+
+
+def say_picture(each: UndescribedPicture, book: PictureBook) -> str:
+    """Return by which id a picture is described, where it was taken, and what is known of it."""
+    seen = each.match.observation
+    taken = book.find(seen.picture or "")
+    parts = [f"{taken.id if taken else seen.id} in {seen.room_id or 'no room'}"]
+    if seen.labels:
+        parts.append(f"the detector saw {quote(', '.join(seen.labels), most=LONGEST_QUOTE)}")
+    if each.beside is not None:
+        parts.append(f"beside {quote_name(each.beside)}")
+    return ", ".join(parts)
 
 
 def say_forgotten(done: Forgotten, words: str, *, is_undo: bool = False) -> str:

@@ -13,6 +13,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import (
     LEFT_OUT,
     SAME_SPOT_M,
+    SAME_VIEW_RAD,
     Concern,
     Confidence,
     Landmark,
@@ -31,9 +32,6 @@ from mapspeak.memory import (
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import is_taken_name
 from mapspeak.server.text.offered import lead
-
-SAME_VIEW_RAD = math.radians(15.0)
-"""A picture of a heading that much off still shows nearly all that is seen along the other."""
 
 SAME_BEARING_RAD = math.radians(20.0)
 """A direction read off a picture and one that was measured differ by less 19 times in 20."""
@@ -76,27 +74,67 @@ class Landmarks(RootModel[list[Label | LandmarkInput]]):
     root: list[Label | LandmarkInput] = Field(max_length=50)
 
 
+Name = Annotated[
+    str,
+    Field(description="as people say", min_length=1, max_length=120),
+]
+Feature = Annotated[str, Field(max_length=300)]
+Description = Annotated[str, Field(description="in two sentences", max_length=2000)]
+Safety = Annotated[Landmarks | None, Field(description="fixed safety equipment")]
+Functional = Annotated[Landmarks | None, Field(description="fixed things tasks need")]
+Features = Annotated[
+    list[Feature] | None,
+    Field(max_length=50, description="layout: walls, openings"),
+]
+SeenIn = Annotated[
+    str | None, Field(description="that shows it, e.g. P3; else from here", max_length=80)
+]
+
+
+class PlaceInput(BaseModel):
+    """A place as it is described, from a picture or from where the robot stands."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Name
+    description: Description
+    picture: SeenIn = None
+    safety_landmarks: Safety = None
+    functional_landmarks: Functional = None
+    geometric_features: Features = None
+
+    @property
+    def shows_things(self) -> bool:
+        """True where more than words is told of it: by a picture, by things or by its layout."""
+        things = self.safety_landmarks or self.functional_landmarks
+        return bool(self.picture or things or self.geometric_features)
+
+
 @dataclass(slots=True, kw_only=True)
 class Annotator:
     """Turns the description of a place into landmarks as seen from one pose.
 
     Attributes:
         pictures: The pictures that can be spoken of.
+        described: The one that the place is described from.
         laser: The present ranges of the robot's laser; None where not asked for, or without one.
         refused: What stays out, each with its reason; filled as landmarks are taken.
     """
 
     pictures: PictureBook
+    described: TakenPicture | None = None
     laser: LaserRing | None = None
     refused: list[str] = field(default_factory=list)
 
     def find_origin(
         self, safety: Landmarks | None, functional: Landmarks | None
     ) -> TakenPicture | None:
-        """Return the picture of most safety things, then of most, then the last.
+        """Return the picture that is described, else that of most safety things, of most, the last.
 
         None where one thing was seen from here.
         """
+        if self.described is not None:
+            return self.described
         seen = [(thing, self._find_picture(thing)) for thing in _things((safety, functional))]
         if any(thing.bearing_deg is not None and picture is None for thing, picture in seen):
             return None
@@ -107,8 +145,8 @@ class Annotator:
         )
 
     def find_picture_from(self, pose: Pose) -> TakenPicture | None:
-        """Return the picture that was taken last, if it shows what is seen from a pose."""
-        latest = self.pictures.latest
+        """Return the picture that shows what is seen from a pose: the described or last one."""
+        latest = self.described or self.pictures.latest
         if latest is None:
             return None
         is_same = latest.pose.is_near(pose, off_m=SAME_SPOT_M, turn_rad=SAME_VIEW_RAD)
@@ -239,7 +277,7 @@ class Annotator:
     def _find_picture(self, thing: LandmarkInput) -> TakenPicture | None:
         if thing.picture is not None:
             return self.pictures.find(thing.picture)
-        return None if thing.image_column_px is None else self.pictures.latest
+        return None if thing.image_column_px is None else self.described or self.pictures.latest
 
     def _no_such_picture(self, said: str) -> SemanticMapError:
         latest = self.pictures.latest

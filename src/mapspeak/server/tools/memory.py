@@ -39,6 +39,7 @@ from mapspeak.server.text.recall import say_forgotten
 from mapspeak.server.text.wording import say_renamed
 from mapspeak.server.text.world.reported import say_labels
 from mapspeak.server.tools.places import find_room
+from mapspeak.server.tools.sightings import load_picture, show_undescribed
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.worldmodel.model import WorldModel
@@ -48,6 +49,7 @@ MOST_NEAR_SEEN = 8
 """Fewer observations beside things: what is near is mostly told by these."""
 MOST_SUMMED = 1000
 MOST_UNSUMMED = 5
+UNDESCRIBED = "undescribed"
 
 FromRow = Annotated[int, Field(description="go on from this row", ge=0, le=1_000_000, strict=True)]
 Words = Annotated[str | None, Field(description="what they are about", max_length=300)]
@@ -71,7 +73,12 @@ Until = Annotated[str | None, Field(description="before; likewise", max_length=4
 Label = Annotated[str | None, Field(description="a thing seen, by its label", max_length=120)]
 Kind = Annotated[ObservationKind | None, Field(description="what they came from")]
 PictureOf = Annotated[
-    str | None, Field(description="P3, or id of an observation: shows its picture", max_length=80)
+    str | None,
+    Field(
+        description="P3, or id of an observation: shows its picture; undescribed: those without "
+        "words",
+        max_length=80,
+    ),
 ]
 Text = Annotated[
     str, Field(description="what is the matter, in a sentence", min_length=1, max_length=300)
@@ -357,6 +364,8 @@ class MemoryTools:
         return keeping.fault
 
     async def _show(self, observation_id: str) -> list[str | Image]:
+        if observation_id.strip().casefold() == UNDESCRIBED:
+            return await show_undescribed(self._session)
         store, taken = self._session.episodes.store, self._session.pictures.find(observation_id)
         name = observation_id.strip() if taken is None else taken.name
         seen = await self._session.compute(lambda: store.get(name))
@@ -368,12 +377,8 @@ class MemoryTools:
         match = placed(seen, self._session.memory.place_maps())
         match = match if taken is None else match.with_picture(taken.id)
         said = say_episode(match, now=self._session.find_wall_time())
-        path = await self._session.compute(lambda: store.picture_path(seen))
-        if path is None:
-            return [f"{said}\nIts picture is not kept (any more)."]
-        data = await self._session.compute(path.read_bytes)
-        kind = "png" if path.suffix == ".png" else "jpeg"
-        return [said, Image(data=data, format=kind)]
+        image = await load_picture(self._session, seen)
+        return [f"{said}\nIts picture is not kept (any more)."] if image is None else [said, image]
 
 
 def _require_present_ids(world: WorldModel, words: str) -> None:

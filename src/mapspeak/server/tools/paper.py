@@ -6,12 +6,13 @@ from functools import partial
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Image
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
 from mapspeak.driving.episodewriter import Keeping
-from mapspeak.errors import LinkError, MapError, SemanticMapError
+from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
+from mapspeak.memory.quoting import quote_name
 from mapspeak.places.asking import find_speaking_places
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.things import find_gone, forget_thing
@@ -20,10 +21,28 @@ from mapspeak.server.reports.mappicture import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far
-from mapspeak.server.text.recall import say_advice, say_gone, say_placed
+from mapspeak.server.text.offered import say_error
+from mapspeak.server.text.recall import (
+    say_advice,
+    say_gone,
+    say_placed,
+    say_undescribed,
+)
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
-from mapspeak.server.tools.annotating import Annotator, Landmarks, check_name
-from mapspeak.server.tools.sightings import fetch_ring
+from mapspeak.server.tools.annotating import (
+    Annotator,
+    Description,
+    Feature,
+    Features,
+    Functional,
+    Landmarks,
+    Name,
+    PlaceInput,
+    Safety,
+    SeenIn,
+    check_name,
+)
+from mapspeak.server.tools.sightings import fetch_ring, find_taken, find_undescribed_pictures
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.spatial.picture import (
@@ -32,18 +51,6 @@ from mapspeak.spatial.picture import (
     draw_robot_pose,
 )
 
-Name = Annotated[
-    str,
-    Field(description="as people say", min_length=1, max_length=120),
-]
-Feature = Annotated[str, Field(max_length=300)]
-Description = Annotated[str, Field(description="in two sentences", max_length=2000)]
-Safety = Annotated[Landmarks | None, Field(description="fixed safety equipment")]
-Functional = Annotated[Landmarks | None, Field(description="fixed things tasks need")]
-Features = Annotated[
-    list[Feature] | None,
-    Field(max_length=50, description="layout: walls, openings"),
-]
 Gone = Annotated[list[Feature] | None, Field(max_length=50, description="labels no longer there")]
 X = Annotated[
     float | None,
@@ -55,6 +62,16 @@ Degrees = Annotated[
     Field(
         description="else as in the picture of most safety things, or of most", allow_inf_nan=False
     ),
+]
+Others = Annotated[
+    list[PlaceInput],
+    Field(max_length=20),
+    # A model need not read the same arguments twice.
+    WithJsonSchema({"type": "array"}),
+]
+More = Annotated[
+    Others | None,
+    Field(description="further places, each with these arguments but gone, x, y, yaw_deg"),
 ]
 Query = Annotated[str | None, Field(description="or by what is there", max_length=200)]
 FromRow = Annotated[int, Field(description="row", ge=0)]
@@ -115,30 +132,62 @@ class PaperTools:
         x: X = None,
         y: Y = None,
         yaw_deg: Degrees = None,
+        picture: SeenIn = None,
+        more: More = None,
     ) -> WriteAnswer:
-        """Remember a place in the semantic map: what is seen from here, with the pose.
+        """Remember a place: what is seen from here.
 
         A known name is updated: landmarks that you do not name stay. Leave out people, loose boxes
         and guesses.
         """
-        check_name(name)
+        first = PlaceInput(
+            name=name,
+            description=description,
+            picture=picture,
+            safety_landmarks=safety_landmarks,
+            functional_landmarks=functional_landmarks,
+            geometric_features=geometric_features,
+        )
+        answer = await self._write(first, gone=gone, x=x, y=y, yaw_deg=yaw_deg)
+        others = [await self._write_too(each) for each in more or ()]
+        return answer.model_copy(update={"others": others})
+
+    async def _write_too(self, place: PlaceInput) -> str:
+        """Write a further place; what is wrong with one costs no other."""
+        try:
+            return (await self._write(place)).line(place.name)
+        except MapspeakError as error:
+            return f"{quote_name(place.name)} was not written: {say_error(error)}"
+
+    async def _write(
+        self,
+        place: PlaceInput,
+        *,
+        gone: Sequence[str] | None = None,
+        x: float | None = None,
+        y: float | None = None,
+        yaw_deg: float | None = None,
+    ) -> WriteAnswer:
+        safety_landmarks, functional_landmarks = place.safety_landmarks, place.functional_landmarks
+        check_name(place.name)
         await self._session.meet_map()
-        annotator = Annotator(pictures=self._session.pictures)
+        described = await find_taken(self._session, place.picture)
+        annotator = Annotator(pictures=self._session.pictures, described=described)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
         here, doubt = await self._find_robot()
         seen_at = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
-        shows = safety_landmarks or functional_landmarks or geometric_features or not gone
-        pose = await self._find_stand(name, seen_at, is_told=x is not None, shows=bool(shows))
+        shows = place.shows_things or not gone
+        pose = await self._find_stand(place.name, seen_at, is_told=x is not None, shows=shows)
         picture = annotator.find_picture_from(pose)
         if pose.point == here.point:
             await self._add_laser(annotator, pose, picture, safety_landmarks, functional_landmarks)
         waypoint = Waypoint(
-            name=name,
-            description=annotator.take_description(description),
+            name=place.name,
+            description=annotator.take_description(place.description),
             pose=pose,
             safety_landmarks=annotator.take(safety_landmarks, pose=pose, picture=picture),
             functional_landmarks=annotator.take(functional_landmarks, pose=pose, picture=picture),
-            geometric_features=annotator.take_features(geometric_features or ()),
+            geometric_features=annotator.take_features(place.geometric_features or ()),
             **self._date(picture),
             room_id=await self._find_room_id(pose),
             picture=None if picture is None else picture.name,
@@ -162,7 +211,8 @@ class PaperTools:
         """Read remembered places in full, as observed. To find something take {find_place}."""
         if query is None:
             memory = await self._session.compute(self._session.memory.read)
-            return MemoryAnswer.of(memory, name, first=from_row)
+            advice = [] if name else await self._offer_undescribed()
+            return MemoryAnswer.of(memory, name, first=from_row, advice=advice)
         if name is not None:
             raise SemanticMapError(
                 "Both name and query were given.", hint="Give the one or the other."
@@ -171,6 +221,14 @@ class PaperTools:
         shown, answer = await self._session.compute(lambda: find_speaking_places(world, query))
         advice = [say_advice(answer)]
         return MemoryAnswer.of_places(world.memory, shown, first=from_row, advice=advice)
+
+    async def _offer_undescribed(self) -> list[str]:
+        try:
+            pictures = await find_undescribed_pictures(self._session)
+        except SemanticMapError:
+            # Observations that cannot be read cost no answer about what is remembered.
+            return []
+        return say_undescribed(pictures, self._session.pictures)
 
     async def _find_stand(self, name: str, seen_at: Pose, *, is_told: bool, shows: bool) -> Pose:
         """Return where a place lies; one of which only something is gone stays where it was."""

@@ -1,20 +1,29 @@
-"""The present views of camera and laser: the picture with its caption, rings for records."""
+"""Views of camera and laser: a new picture with its caption, kept ones, rings for records."""
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import anyio
 from mcp.server.mcpserver import Image
+from PIL import Image as PictureFile
 from pydantic import Field
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, SemanticMapError
 from mapspeak.memory import LaserRing, PictureReading, TakenPicture, build_ring
+from mapspeak.memory.episodes.observation import Observation, named_pictures, placed
+from mapspeak.places.recall.nearby import in_rooms_of
+from mapspeak.places.recall.undescribed import UndescribedPicture, find_undescribed
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
+from mapspeak.server.text.offered import lead
+from mapspeak.server.text.recall import say_picture, say_undescribed
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
+MOST_SHOWN = 8
 LEGEND = " (bearing, left positive; range; confidence)"
 Camera = Annotated[str | None, Field(description="by name; else front", max_length=60)]
 
@@ -131,6 +140,79 @@ async def look_ahead(session: Session, camera: str | None = None) -> CameraSight
         detections=detections,
         remarks=tuple(filter(None, (doubt, kept.fault))),
     )
+
+
+async def find_taken(session: Session, said: str | None) -> TakenPicture | None:
+    """Return the picture of an id, a name, or an observation, also of an earlier run.
+
+    Raises:
+        SemanticMapError: There is none, or it was taken on a map that lies apart.
+    """
+    taken = None if said is None else session.pictures.find(said)
+    if said is None or taken is not None:
+        return taken
+    store = session.episodes.store
+    seen = await session.compute(lambda: store.get(said.strip()))
+    path = None if seen is None else await session.compute(lambda: store.picture_path(seen))
+    match = None if seen is None else placed(seen, session.memory.place_maps())
+    if seen is None or path is None or match is None or match.is_elsewhere:
+        raise SemanticMapError(
+            f"There is no picture {said[:40]!r} of this map.",
+            hint=lead("Give the id of one, such as P3. {look_through_camera} takes one."),
+        )
+    return session.pictures.find(path.name) or TakenPicture(
+        id=seen.id,
+        name=path.name,
+        pose=match.observation.pose,
+        stamp_s=seen.stamp_s or 0.0,
+        recorded_at=seen.recorded_at,
+        width_px=await session.compute(partial(_measure_width_px, path)),
+        horizontal_fov_rad=None,
+        reported=seen.labels or None,
+    )
+
+
+def _measure_width_px(path: Path) -> int:
+    with PictureFile.open(path) as picture:
+        return picture.width
+
+
+async def find_undescribed_pictures(session: Session) -> tuple[UndescribedPicture, ...]:
+    """Return the kept pictures of this map that nothing was written of, the newest first.
+
+    Their rooms are those of the map that was looked at last.
+    """
+    world = session.world
+
+    def find() -> tuple[UndescribedPicture, ...]:
+        named = named_pictures(session.memory.store.read())
+        found = find_undescribed(session.find_episodes, session.memory.read(), named=named)
+        if world is None:
+            return found
+        matches = in_rooms_of(world, (each.match for each in found))
+        return tuple(replace(each, match=at) for each, at in zip(found, matches, strict=True))
+
+    return await session.compute(find)
+
+
+async def show_undescribed(session: Session) -> list[str | Image]:
+    """Return pictures that nothing was written of, each with what is known of it."""
+    shown: list[str | Image] = []
+    pictures = await find_undescribed_pictures(session)
+    for each in pictures[:MOST_SHOWN]:
+        image = await load_picture(session, each.match.observation)
+        shown += [] if image is None else [say_picture(each, session.pictures), image]
+    said = say_undescribed(pictures, session.pictures, most=0)
+    return [*shown, *(said or ["No picture is without words."])]
+
+
+async def load_picture(session: Session, seen: Observation) -> Image | None:
+    """Return the picture of an observation; None where it is not kept (any more)."""
+    path = await session.compute(lambda: session.episodes.store.picture_path(seen))
+    if path is None:
+        return None
+    data = await session.compute(path.read_bytes)
+    return Image(data=data, format="png" if path.suffix == ".png" else "jpeg")
 
 
 def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:
