@@ -116,6 +116,7 @@ def _query(
     room: str | None,
     kind: str | None,
     order: str | None,
+    label: str | None,
     **same: Any,  # noqa: ANN401 - what a query calls as the command line does
 ) -> EpisodeQuery:
     if near is not None and near_words is not None:
@@ -129,6 +130,7 @@ def _query(
         room_id=room,
         kind=None if kind is None else ObservationKind(kind),
         order=None if order is None else EpisodeOrder(order),
+        labels=() if label is None else (label,),
         **same,
     )
 

@@ -4,11 +4,6 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
-from mapspeak.driving.exploration.progress import (
-    expected_area_m2,
-    known_area_m2,
-    known_ratio,
-)
 from mapspeak.robot import NavigationLook, NavigationPart
 from mapspeak.server.text.wording import say_count
 from mapspeak.spatial.frontiers import (
@@ -21,7 +16,6 @@ from mapspeak.spatial.frontiers import (
 )
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Door, Region, RoomClass
-from mapspeak.worldmodel.model import WorldModel
 
 
 def say_size(region: Region) -> str:
@@ -229,24 +223,3 @@ def say_navigation_part(look: NavigationLook) -> str:
         end = points[-1]
         what = f"{length_m:.1f} m long, ends at x {end.x:.2f}, y {end.y:.2f}, "
     return f"{what}{look.age_s:.1f} s old"
-
-
-def say_explored(world: WorldModel) -> str:
-    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
-
-    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
-    """
-    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
-    if not world.frontiers.frontiers:
-        return f"{known_m2:.1f} m2 of free floor, {percent} %."
-    promised_m2 = expected_area_m2(world) - known_m2
-    # Not all of it, as long as there is a frontier to go to.
-    return (
-        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
-        f"{_round(promised_m2)} m2 more for now."
-    )
-
-
-def _round(area_m2: float) -> str:
-    """Return an estimate with the one or two digits that it is good for."""
-    return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"

@@ -2,6 +2,7 @@
 
 import math
 
+from mapspeak.driving.exploration.progress import expected_area_m2, known_area_m2, known_ratio
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import tell_place
@@ -89,3 +90,24 @@ def say_direction(world: WorldModel, point: Point) -> str:
     turn_rad = wrap_angle(world.robot.point.bearing_to(point) - world.robot.yaw_rad)
     eighth = round(turn_rad / (math.tau / 8)) % 8
     return f"{away_m:.1f} m straight, {DIRECTIONS[eighth]}"
+
+
+def say_explored(world: WorldModel) -> str:
+    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
+
+    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
+    """
+    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
+    if not world.frontiers.frontiers:
+        return f"{known_m2:.1f} m2 of free floor, {percent} %."
+    promised_m2 = expected_area_m2(world) - known_m2
+    # Not all of it, as long as there is a frontier to go to.
+    return (
+        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
+        f"{_round(promised_m2)} m2 more for now."
+    )
+
+
+def _round(area_m2: float) -> str:
+    """Return an estimate with the one or two digits that it is good for."""
+    return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"

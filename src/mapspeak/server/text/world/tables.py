@@ -25,7 +25,6 @@ from mapspeak.server.text.world.look import (
 )
 from mapspeak.server.text.world.maps import (
     say_doubtful_door,
-    say_explored,
     say_merits,
     say_navigation,
     say_ranks,
@@ -33,7 +32,12 @@ from mapspeak.server.text.world.maps import (
     say_unsure,
     say_verdict,
 )
-from mapspeak.server.text.world.notices import say_area, say_obstruction, say_warnings
+from mapspeak.server.text.world.notices import (
+    say_area,
+    say_explored,
+    say_obstruction,
+    say_warnings,
+)
 from mapspeak.server.text.world.told import PICTURE, WAY, Told, tell_rows
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import CorridorWalk, Door, DoorSide, PassedDoor, Region, RoomClass
