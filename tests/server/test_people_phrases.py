@@ -182,6 +182,13 @@ async def test_a_room_can_be_looked_back_out_of(client: Client, words: str) -> N
     assert math.isfinite(goal["path_m"])
 
 
+async def test_who_looks_back_stands_straight_before_the_door(client: Client) -> None:
+    for room in await _sizes(client):
+        goal = await _goal(client, f"{room} looking back through its door")
+        # All doors here are in walls from west to east.
+        assert abs(goal["pose"]["yaw_deg"]) == pytest.approx(90, abs=15)
+
+
 async def test_of_some_rooms_the_smallest_is_told_as_that_of_these(client: Client) -> None:
     first, second, *_ = await _sizes(client)
     one = text_of(await client.call_tool("measure", {"places": [second]}))

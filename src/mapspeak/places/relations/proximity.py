@@ -16,9 +16,15 @@ from mapspeak.places.relations.placement import (
     stand,
     tolerance_m,
 )
-from mapspeak.places.relations.referents import ROBOT, Referent, find_normal, point_before
+from mapspeak.places.relations.referents import (
+    ROBOT,
+    Referent,
+    find_normal,
+    point_before,
+    refer_to_door,
+)
 from mapspeak.places.standing import point_along, reach_doors
-from mapspeak.spatial.rooms import Region
+from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = (0.15, 0.7)
@@ -27,6 +33,8 @@ NEARLY_M = 1.5
 LEAST_SIGHT_M, SIGHT_M = 0.3, 3.0
 """The least room before a robot that faces a thing, and the farthest it stands away."""
 NEAR_DOOR_M = 1.5
+THROUGH_DOOR_M = 2.0
+"""From nearer a picture shows one post; from farther little of what lies behind the door."""
 
 
 def stand_away(world: WorldModel, thing: Referent, away_m: float) -> Place:
@@ -102,6 +110,21 @@ def stand_facing(world: WorldModel, thing: Referent) -> Place:
         )
     away_m = point.distance_to(thing.anchor)
     return _facing(thing, point, f"{away_m:.1f} m from {thing.name}, in sight of it")
+
+
+def find_spot_before_door(world: WorldModel, door: Door, room: Region) -> Point | None:
+    """Find where in a room one stands straight before a door, about 2 m off, and sees through it.
+
+    None where the robot stands nowhere between its posts' lines.
+    """
+    thing, into_rad = refer_to_door(world, door, room), find_normal(world, door, room)
+    floor, _ = _find_around(world, thing, SIGHT_M)
+    off_m = floor.along_m(door.place, into_rad)
+    aside_m = np.abs(floor.along_m(door.place, into_rad + math.pi / 2))
+    allowed = floor.is_beside(room, None) & (aside_m <= door.width_m / 2)
+    allowed &= off_m >= world.radius_m + LEAST_SIGHT_M
+    worse_m = np.abs(off_m - THROUGH_DOOR_M) + aside_m
+    return floor.choose(world, allowed, worse_m, in_sight_of=_find_sight(world, thing))
 
 
 def _find_around(

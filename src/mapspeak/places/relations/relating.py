@@ -39,11 +39,11 @@ from mapspeak.places.relations.outlines import (
 )
 from mapspeak.places.relations.placement import (
     find_reachable_cells,
-    is_in_sight,
     refuse,
     stand,
 )
 from mapspeak.places.relations.proximity import (
+    find_spot_before_door,
     stand_away,
     stand_between,
     stand_facing,
@@ -269,9 +269,8 @@ class Reader:
             works = [room.id] if find_standing_point(world, room) is not None else []
             raise refuse(f"The robot gets through no door of {room.id}.", works)
         _, door, _ = reached[0]
-        at, why = standing_point(world, Place(room.id, room)), f"in {room.id}, facing {door.id}"
-        sees = is_in_sight(world, np.array([[at.x, at.y]]), door.place)
-        if not sees[0]:
+        at, why = find_spot_before_door(world, door, room), f"in {room.id}, facing {door.id}"
+        if at is None:
             at = stand_facing(world, refer_to_door(world, door, room)).point
         counted = "its door" if len(reached) == 1 else f"the nearest of its {len(reached)} doors"
         return stand(at, f"{why}, {counted}", at.bearing_to(door.place))
