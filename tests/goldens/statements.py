@@ -341,7 +341,7 @@ def _check_ranks(world: WorldModel, text: str) -> Iterator[Fact]:
     )
     if found is None:
         return
-    unsure_line = re.search(r"Maybe parts of others: (.*)\.$", text, re.MULTILINE)
+    unsure_line = re.search(r"(?:Maybe|Probably) parts of others: (.*)\.$", text, re.MULTILINE)
     # "R2 (51.9+ m2, larger than R3)" is of R2.
     unsure = set(re.findall(r"\b([RO]\d+) \(", unsure_line[1])) if unsure_line else set()
     sizes = {
