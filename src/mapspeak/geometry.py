@@ -69,6 +69,12 @@ class Pose:
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return Point(self.x + cos * point.x - sin * point.y, self.y + sin * point.x + cos * point.y)
 
+    def point_at(self, bearing_rad: float, range_m: float) -> Point:
+        """Return the point so far off in a direction, which counts from the heading."""
+        return self.transform(
+            Point(range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad))
+        )
+
     def is_near(self, other: "Pose", *, off_m: float, turn_rad: float) -> bool:
         """Return True when the other is no farther away and turned by no more than that."""
         turned_rad = abs(wrap_angle(other.yaw_rad - self.yaw_rad))

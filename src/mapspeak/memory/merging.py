@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import SAME_STAND_M
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.waypoint import Confidence, Landmark, Waypoint
@@ -145,8 +145,7 @@ def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
     moved_m = old.point.distance_to(new.point)
     bearing_rad, range_m, laser = landmark.bearing_rad, landmark.range_m, landmark.laser
     if bearing_rad is not None and range_m is not None:
-        ahead = Point(range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad))
-        there = new.inverse().transform(old.transform(ahead))
+        there = new.inverse().transform(old.point_at(bearing_rad, range_m))
         bearing_rad, range_m = math.atan2(there.y, there.x), math.hypot(there.x, there.y)
     elif moved_m > SAME_SPOT_M:
         bearing_rad = range_m = None

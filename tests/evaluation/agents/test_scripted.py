@@ -106,3 +106,12 @@ async def test_a_thing_that_one_look_has_shown_is_looked_at_before_an_errand(
         assert "search_for" not in ledger.calls
         (thing,) = await driver.find_things("fridge")
     assert len(thing["seen_from"]) == 2
+
+
+async def test_a_look_is_taken_where_its_drive_ends(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        driver = ToolDriver(ToolClient(client, Hearing()))
+        views = await driver.look_with("look_at", place="R1", wait_s=0.1)
+    (at,) = [pose.point for pose, _ in views]
+    assert (at.x, at.y) == pytest.approx((robot.pose.x, robot.pose.y), abs=0.01)

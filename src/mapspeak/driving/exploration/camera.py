@@ -25,7 +25,7 @@ from mapspeak.places.relations.viewpoints import (
     face_room,
     find_room_near,
 )
-from mapspeak.places.standing import point_ahead, spread_places
+from mapspeak.places.standing import spread_places
 from mapspeak.robot import GoalState
 from mapspeak.safety import ApprovalScope
 from mapspeak.spatial.fieldofview import (
@@ -95,11 +95,13 @@ def find_untold(
             if picture.id in on_the_way:
                 untold.append((range_m, picture, reading))
             else:
-                told[reading.label].append((_place_of(picture, reading, range_m), range_m))
+                place = picture.pose.point_at(reading.bearing_rad, range_m)
+                told[reading.label].append((place, range_m))
     kept = defaultdict[str, list[PictureReading]](list)
     shown = {picture.id: picture for _, picture, _ in untold}
     for range_m, picture, reading in sorted(untold, key=lambda each: each[0]):
-        place, known = _place_of(picture, reading, range_m), told[reading.label]
+        place = picture.pose.point_at(reading.bearing_rad, range_m)
+        known = told[reading.label]
         if all(
             place.distance_to(other) > SAME_M + SAME_RATIO * other_m
             or range_m < NEARER_RATIO * other_m
@@ -112,11 +114,6 @@ def find_untold(
         for picture_id, picture in shown.items()
         if picture_id in kept
     )
-
-
-def _place_of(picture: TakenPicture, reading: PictureReading, range_m: float) -> Point:
-    heading = picture.pose.yaw_rad + reading.bearing_rad
-    return point_ahead(picture.pose.point, heading, range_m)
 
 
 def find_camera_target(

@@ -139,6 +139,8 @@ class DetectedThing:
     range_m: float
 
 
+UNDER_WAY = "Call look_at again"
+"""Said in place of a picture while the robot is on its way to where it is taken."""
 View = tuple[Pose, tuple[DetectedThing, ...]]
 """Where a picture was taken, and what the detector reports in it."""
 
@@ -260,8 +262,11 @@ class ToolDriver:
         return tuple(each for each in read_sightings(text) if each.range_m <= self.sight_m)
 
     async def look_with(self, tool: str, **arguments: object) -> list[View]:
-        """Take pictures with a tool, and return what the detector reports in each."""
-        parts = TAKEN.split((await self.tools.call(tool, **arguments)).text)
+        """Take pictures with a tool, at the end of its drive if any; return what they show."""
+        text = (await self.tools.call(tool, **arguments)).text
+        while UNDER_WAY in text:
+            text = (await self.tools.call(tool, **arguments)).text
+        parts = TAKEN.split(text)
         numbers = zip(parts[1::4], parts[2::4], parts[3::4], strict=True)
         return [
             (_read_pose(of_pose), self.note(rest))

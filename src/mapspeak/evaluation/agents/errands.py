@@ -9,9 +9,8 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from mapspeak.evaluation.agent import AgentEnd, gave_up
-from mapspeak.evaluation.agents.driver import DetectedThing, ToolDriver
-from mapspeak.geometry import Point, Pose
-from mapspeak.places.standing import point_ahead
+from mapspeak.evaluation.agents.driver import ToolDriver
+from mapspeak.geometry import Point
 
 PLACE = re.compile(
     r"[Gg]o to the (?:space around \((?P<x>-?[\d.]+), (?P<y>-?[\d.]+)\)|nearest (?P<label>[^.]+?)) "
@@ -100,14 +99,12 @@ async def _see_again(driver: ToolDriver, label: str, thing: str, *, near: Point)
         for pose, sightings in await driver.look_with(tool, **look):
             if seen := tuple(each for each in sightings if label in each.label):
                 await driver.record(seen, name=label, taken_at=pose)
-                places += [_place_of(pose, each) for each in seen]
+                places += [
+                    pose.point_at(math.radians(each.bearing_deg), each.range_m) for each in seen
+                ]
         if places:
             return min(places, key=near.distance_to)
     return None
-
-
-def _place_of(pose: Pose, seen: DetectedThing) -> Point:
-    return point_ahead(pose.point, pose.yaw_rad + math.radians(seen.bearing_deg), seen.range_m)
 
 
 async def _find_at(driver: ToolDriver, label: str, place: Point) -> str:

@@ -347,11 +347,7 @@ def _find_measured(
     reading = _find_reading(thing.label, stood, bearing_rad, picture)
     if reading is None or reading.range_m is None:
         return None
-    ahead = Point(
-        reading.range_m * math.cos(reading.bearing_rad),
-        reading.range_m * math.sin(reading.bearing_rad),
-    )
-    point = picture.pose.transform(ahead)
+    point = picture.pose.point_at(reading.bearing_rad, reading.range_m)
     measured_m = stood.point.distance_to(point)
     if thing.range_m is not None and abs(thing.range_m - measured_m) > SAME_RANGE_M:
         return None
