@@ -373,6 +373,32 @@ def test_a_thing_that_cannot_be_come_near_to_is_gone_to_as_near_as_it_is_in_sigh
     assert "the nearest place in sight of it" in goal.place.reason
 
 
+BEHIND_A_SLOT_ON_A_WALL = """
+    ########################
+    #......................#
+    #......................#
+    #......................#
+    #......#############...#
+    #......#...#...........#
+    #......#...#...........#
+    #......#...............#
+    #......#...#...........#
+    #......#...#...........#
+    ########################
+    """
+
+
+def test_a_thing_that_cannot_be_come_near_to_is_not_gone_to_behind_its_wall() -> None:
+    grid = grid_from_text(BEHIND_A_SLOT_ON_A_WALL, resolution_m=0.5)
+    printer = Landmark(label="printer", bearing_rad=0.0, range_m=4.9)
+    seen = Waypoint(name="far", pose=Pose(8.75, 1.75, math.pi), functional_landmarks=(printer,))
+    world = WorldModel(grid, seen.pose, SemanticMap(waypoints=(seen,)), radius_m=0.6)
+    assert world.find_approach(world.things[0]) is None
+    goal = check_place(world, find_place(world, "printer"))
+    assert goal.check.is_ok
+    assert goal.pose.x > 5.5
+
+
 def test_what_is_looked_for_from_afar_is_not_told_as_gone_to_as_near_as_it_is_in_sight() -> None:
     grid = grid_from_text(BEHIND_A_SLOT, resolution_m=0.5)
     crate = Landmark(label="crate", bearing_rad=0.0)

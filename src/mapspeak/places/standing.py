@@ -20,8 +20,8 @@ from mapspeak.worldmodel.revision import MapRevision
 
 EVERY_M = 1.0
 """Places to look from are this far from each other."""
-OWN_M = 0.6
-"""So near to a thing nothing hides it but itself, or the wall that it hangs on."""
+BEFORE_M = 0.1
+"""So near to the last floor before a thing nothing hides that."""
 
 
 def find_standing_point(world: WorldModel, region: Region) -> Point | None:
@@ -159,7 +159,11 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
 
 
 def find_stand_off(world: WorldModel, remembered: RememberedThing) -> Pose | None:
-    """Return the nearest place in sight of a thing; None where it was seen from none farther."""
+    """Return the nearest place in sight of a thing; None where it was seen from none farther.
+
+    The floor before it has to be in sight, on the side that it was seen from: a thing at a wall is
+    as near to the room behind that.
+    """
     target = remembered.thing.position
     if target is None:
         return None
@@ -168,10 +172,11 @@ def find_stand_off(world: WorldModel, remembered: RememberedThing) -> Pose | Non
     )
     stands, _ = spread_places(world)
     away_m = np.hypot(stands[:, 0] - target.x, stands[:, 1] - target.y)
+    fronts = set(world.find_fronts(remembered))
     for index in np.argsort(away_m, kind="stable")[: np.count_nonzero(away_m < seen_m)]:
         x, y = stands[index].tolist()
         stand = Point(x, y)
-        if is_in_sight(world.grid, stand, target, own_m=OWN_M):
+        if any(is_in_sight(world.grid, stand, front, own_m=BEFORE_M) for front in fronts):
             return Pose(x, y, stand.bearing_to(target))
     return None
 

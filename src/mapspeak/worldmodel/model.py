@@ -306,7 +306,7 @@ class WorldModel:
                 self.distances,
                 position,
                 _seen_from(remembered),
-                fronts=self._find_fronts(remembered),
+                fronts=self.find_fronts(remembered),
                 whereabouts=thing.whereabouts,
                 others=others,
             ),
@@ -332,7 +332,7 @@ class WorldModel:
 
     def rooms_before(self, remembered: RememberedThing) -> tuple[str, ...]:
         """Return the rooms a thing may be in, by id: those on the side that it was seen from."""
-        fronts, seen_from = self._find_fronts(remembered), _seen_from(remembered)
+        fronts, seen_from = self.find_fronts(remembered), _seen_from(remembered)
         return _keep(
             self.reach.rooms,
             remembered,
@@ -341,7 +341,7 @@ class WorldModel:
             ),
         )
 
-    def _find_fronts(self, remembered: RememberedThing) -> list[Point]:
+    def find_fronts(self, remembered: RememberedThing) -> list[Point]:
         """Return the last floor before a thing for each who saw it, or where these stood."""
         seen_from, position = _seen_from(remembered), remembered.thing.position
         if position is None:
