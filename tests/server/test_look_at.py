@@ -126,6 +126,21 @@ async def test_a_thing_in_view_from_near_is_looked_at_from_where_the_robot_stand
     assert "T1" in columns(told)
 
 
+@pytest.mark.parametrize(("seen_m", "least_m", "most_m"), [(1.0, 0.7, 1.5), (3.5, 1.5, 2.5)])
+async def test_a_thing_is_not_looked_at_from_much_nearer_than_it_was_seen(
+    tmp_path: Path, seen_m: float, least_m: float, most_m: float
+) -> None:
+    robot = FakeRobot(two_rooms(), pose=Pose(7.4 - seen_m, 1.4))
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("look_through_camera", {})
+        sign = {"label": "exit sign", "bearing_deg": 0, "range_m": seen_m}
+        noted = {"name": "w", "description": "a wall", "safety_landmarks": [sign]}
+        await client.call_tool("write_semantic_data", noted)
+        await client.call_tool("navigate_to", {"place": "exit sign"})
+        await client.call_tool("look_at", {"place": "exit sign"})
+    assert least_m <= Point(7.4, 1.4).distance_to(robot.pose.point) <= most_m
+
+
 async def test_a_drive_that_takes_longer_is_waited_for_by_asking_again(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path) as client:

@@ -14,7 +14,8 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap, TakenPicture
 from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.things.approach import (
-    LARGEST_OFF_M,
+    BEST_OFF_M,
+    SPREAD_M,
     Stands,
     find_fronts,
     find_least_path_m,
@@ -91,7 +92,7 @@ class Reach:
         standing: Where it would stand in each region, by the region's id.
         out_of_reach: The same for regions it cannot get to.
         frontiers: By the places from which it has looked already.
-        stands: Where it may stand before a remembered thing, by what else is near that.
+        stands: Where it may stand before a remembered thing, by how far off and what else is near.
         overlooks: From where it would look for one that is not known well enough.
         faced: The share of where a thing may be that it would face there, by the pose.
         fronts: The last floor before a thing, for each who saw it.
@@ -104,7 +105,7 @@ class Reach:
     standing: dict[str, Point | None] = field(default_factory=dict)
     out_of_reach: dict[str, Point] = field(default_factory=dict)
     frontiers: dict[Tried, FrontierReport] = field(default_factory=dict)
-    stands: ThingMap[dict[bytes, Stands]] = field(default_factory=WeakKeyDictionary)
+    stands: ThingMap[dict[tuple[float, bytes], Stands]] = field(default_factory=WeakKeyDictionary)
     overlooks: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
     faced: ThingMap[dict[Pose, float]] = field(default_factory=WeakKeyDictionary)
     fronts: ThingMap[list[Point]] = field(default_factory=WeakKeyDictionary)
@@ -292,15 +293,17 @@ class WorldModel:
             return remembered
         return next(each for each in self.things if each.thing is moved)
 
-    def find_approach(self, remembered: RememberedThing) -> Pose | None:
-        """Find where the robot stands to face a thing from near; None where it cannot."""
+    def find_approach(
+        self, remembered: RememberedThing, *, off_m: float = BEST_OFF_M
+    ) -> Pose | None:
+        """Find where the robot stands to face a thing from about so far; None where it cannot."""
         thing = remembered.thing
         if (position := thing.position) is None:
             return None
-        others = self.recollection.find_around(position, LARGEST_OFF_M)
+        others = self.recollection.find_around(position, off_m + SPREAD_M)
         stands = _keep(
             self.reach.stands.setdefault(remembered, {}),
-            others.tobytes(),
+            (off_m, others.tobytes()),
             lambda: find_stands(
                 self.recollection.found.sight,
                 self.distances,
@@ -309,6 +312,7 @@ class WorldModel:
                 fronts=self.find_fronts(remembered),
                 whereabouts=thing.whereabouts,
                 others=others,
+                off_m=off_m,
             ),
         )
         return stands.choose(self.distances)

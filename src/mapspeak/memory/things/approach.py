@@ -13,10 +13,11 @@ from mapspeak.spatial.frontiers.viewpoints import NARROW_COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
-LARGEST_OFF_M = 1.4
-"""One stands no farther from a thing, so that it is within 1.5 m on a coarse map, too."""
 BEST_OFF_M = 1.0
 """Near enough for 1.5 m, far enough to have it ahead even where its place is half a metre off."""
+SPREAD_M = 0.4
+"""One stands no farther beyond that, so that it is within 1.5 m on a coarse map, too."""
+LARGEST_OFF_M = BEST_OFF_M + SPREAD_M
 COMFORT_M = 0.15
 """How much more than its radius a robot should have around it where it is sent to stand."""
 FACED_M = 1.5
@@ -80,8 +81,9 @@ def find_stands(
     fronts: Sequence[Point] | None = None,
     whereabouts: FloatArray | None = None,
     others: FloatArray | None = None,
+    off_m: float = BEST_OFF_M,
 ) -> Stands:
-    """Find where a robot can stand within 1.4 m of a thing in sight of it.
+    """Find where a robot can stand about so far off a thing, at most 0.4 m more, in sight of it.
 
     A thing on a wall has floor on both sides of it; the right one is that from which it was seen.
 
@@ -92,20 +94,21 @@ def find_stands(
             best place faces most of them.
         others: Where things are near it, itself too, shape (n, 2): the map may not show these.
     """
-    points, clear_m = _reachable_near(sight, distances, target)
+    points, clear_m = _reachable_near(sight, distances, target, off_m + SPREAD_M)
     fronts = find_fronts(sight, target, seen_from) if fronts is None else fronts
     is_seen = _are_in_sight(sight, fronts, points)
     is_roomy = is_seen & (clear_m >= distances.radius_m + NARROW_COMFORT_M)
     kept = is_roomy if is_roomy.any() else is_seen
     points, clear_m = points[kept], clear_m[kept]
-    off_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
+    away_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
     tight_m = np.maximum(distances.radius_m + COMFORT_M - clear_m, 0.0)
-    costs = np.abs(off_m - BEST_OFF_M) + 2 * tight_m
+    costs = np.abs(away_m - off_m) + 2 * tight_m
     if others is not None:
         costs += HIDDEN_M * _are_hidden(points, target, others)
     yaws = np.arctan2(target.y - points[:, 1], target.x - points[:, 0])
     if whereabouts is not None:
-        is_ahead = _have_ahead(points, yaws, whereabouts)
+        within_m = FACED_M + off_m - BEST_OFF_M
+        is_ahead = _have_ahead(points, yaws, whereabouts, within_m=within_m)
         costs += MISSED_M * (1 - is_ahead.mean(axis=1))
     best = _best_of_each_side(costs, yaws)
     costs = costs[best]
@@ -169,7 +172,7 @@ def find_least_path_m(
     The way ends where one might look at the thing, or at a place that it was seen from. Infinite
     where the robot gets to none of these.
     """
-    rows, cols, _ = _floor_near(grid, target)
+    rows, cols, _ = _floor_near(grid, target, LARGEST_OFF_M)
     at = np.array([(place.x, place.y) for place in seen_from]).reshape(-1, 2)
     stand_rows, stand_cols = grid.cells_at(at)
     is_inside = grid.contains_cells(stand_rows, stand_cols)
@@ -230,26 +233,28 @@ def _have_in_sight(
 
 
 def _reachable_near(
-    sight: SightMap, distances: DistanceField, target: Point
+    sight: SightMap, distances: DistanceField, target: Point, within_m: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the middles of reachable cells around a point, and their clearance in metres."""
-    rows, cols, points = _floor_near(sight.grid, target)
+    rows, cols, points = _floor_near(sight.grid, target, within_m)
     is_reachable = np.isfinite(distances.distances_at(rows, cols))
     rows, cols, points = rows[is_reachable], cols[is_reachable], points[is_reachable]
     # Farther obstacles than this do not matter for standing comfortably.
-    wide_m = LARGEST_OFF_M + distances.radius_m + COMFORT_M
+    wide_m = within_m + distances.radius_m + COMFORT_M
     down, across = sight.grid.window_around(target, wide_m)
     clear_m = clearance_m(sight.grid.crop(down, across))
     return points, clear_m[rows - down.start, cols - across.start].astype(np.float64)
 
 
-def _floor_near(grid: OccupancyGrid, target: Point) -> tuple[IntArray, IntArray, FloatArray]:
+def _floor_near(
+    grid: OccupancyGrid, target: Point, within_m: float
+) -> tuple[IntArray, IntArray, FloatArray]:
     """Return the free cells from which one might look at a thing: rows, columns, and middles."""
-    down, across = grid.window_around(target, LARGEST_OFF_M)
+    down, across = grid.window_around(target, within_m)
     rows, cols = np.nonzero(grid.crop(down, across).free)
     rows, cols = rows + down.start, cols + across.start
     points = grid.points_at(rows, cols)
-    is_near = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y) <= LARGEST_OFF_M
+    is_near = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y) <= within_m
     return rows[is_near], cols[is_near], points[is_near]
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory.things.approach import COMFORT_M, FACED_M
+from mapspeak.memory.things.approach import COMFORT_M, FACED_M, LARGEST_OFF_M
 from mapspeak.places.goalcheck import check_goal
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, choose_goal, find_place
-from mapspeak.places.standing import choose_crossing, point_ahead, spread_places
+from mapspeak.places.standing import choose_crossing, find_overlook_of, point_ahead, spread_places
 from mapspeak.places.ways import stand_at
 from mapspeak.spatial.fieldofview import (
     N_RAYS,
@@ -49,6 +49,8 @@ BEYOND_M = 1.0
 """A ray that ends in the unknown meets a wall so much farther on."""
 LEAST_NEW_M = 0.5
 """Where no heading shows more new wall of a room, it is shown as a whole."""
+NEARER_M = 0.6
+"""From so much nearer than the best place the same is shown."""
 MOVED_M = 1.0
 """A place farther from a goal is another one."""
 Face = Callable[[WorldModel, Pose, Sequence[CameraView]], Pose]
@@ -84,22 +86,25 @@ def choose_view(world: WorldModel, words: str, half_view_rad: float) -> CheckedG
     """
     place = find_place(world, words)
     pose = find_viewpoint(world, place, half_view_rad)
-    if isinstance(place.thing, RememberedThing) and _shows_as_well(world, place, half_view_rad):
-        return replace(check_place(world, place), pose=world.robot)
+    if isinstance(place.thing, RememberedThing):
+        there = stand_at(world, place) if pose is None else pose
+        if _shows_as_well(world, place, there, half_view_rad):
+            return replace(check_place(world, place), pose=world.robot)
     if pose is None:
         return choose_goal(world, place=words, x=None, y=None, yaw_deg=None)
     check = check_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
     return CheckedGoal(place, pose, check)
 
 
-def _shows_as_well(world: WorldModel, place: Place, half_view_rad: float) -> bool:
-    """Return True where the robot has a thing as near and as well in view as it would drive to."""
-    here, there = world.robot, stand_at(world, place)
+def _shows_as_well(world: WorldModel, place: Place, there: Pose, half_view_rad: float) -> bool:
+    """Return True where the robot has a thing as near and as well in view as from a pose."""
+    here = world.robot
     shown, best = (measure_shown(world, place, pose, half_view_rad) for pose in (here, there))
     if not shown or best is None:
         return False
-    near_m = max(place.point.distance_to(there.point), FACED_M)
-    return place.point.distance_to(here.point) <= near_m and shown >= GOOD_RATIO * best
+    there_m, here_m = (place.point.distance_to(pose.point) for pose in (there, here))
+    is_near = there_m - NEARER_M <= here_m <= max(there_m, FACED_M)
+    return is_near and shown >= GOOD_RATIO * best
 
 
 def is_there(robot: Pose, pose: Pose) -> bool:
@@ -119,8 +124,24 @@ def find_viewpoint(world: WorldModel, place: Place, half_view_rad: float) -> Pos
             return _stand_off(world, choose_crossing(world, door))
         case Spot(point=point, yaw_rad=None):
             return _stand_off(world, point)
+        case RememberedThing() as remembered:
+            return _look_from(world, remembered)
         case _:
             return None
+
+
+def _look_from(world: WorldModel, remembered: RememberedThing) -> Pose | None:
+    """Find where to look at a thing from: no nearer than it was seen from, up to two metres.
+
+    What hangs high is in no picture from before it, and how high it hangs nobody noted.
+    """
+    thing = remembered.thing
+    if thing.position is None or find_overlook_of(world, remembered) is not None:
+        return None
+    seen_m = min((view.place.distance_to(thing.position) for view in thing.supporting), default=0.0)
+    if seen_m <= LARGEST_OFF_M:
+        return None
+    return world.find_approach(remembered, off_m=min(seen_m, AWAY_M))
 
 
 def measure_shown(
