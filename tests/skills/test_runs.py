@@ -4,9 +4,8 @@ import anyio
 import pytest
 
 from mapspeak.skill import SkillState
-from mapspeak.skills.mission import Mission
 from mapspeak.skills.runs import SkillRuns
-from mapspeak.skills.steps import Step, StepKind
+from mapspeak.skills.steps import Mission, Step, StepKind
 from skillmaking import FakeSkill, never, spec
 
 pytestmark = pytest.mark.anyio

@@ -16,9 +16,9 @@ from mapspeak.skill import (
     SkillParameter,
 )
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.mission import Mission, MissionBounds, MissionDesk
+from mapspeak.skills.mission import MissionBounds, MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.steps import Step, StepKind, fill_in, parse_tree, read_tree
+from mapspeak.skills.steps import Mission, Step, StepKind, fill_in, parse_tree, read_tree
 from skillmaking import FakeFacts, FakeSkill, spec
 
 

@@ -4,11 +4,9 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mapspeak.errors import SkillError
 from mapspeak.safety import (
@@ -30,11 +28,9 @@ from mapspeak.skill import (
 from mapspeak.skills.arguments import check_arguments, plain
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.missionrunner import MissionRunner
 from mapspeak.skills.skillsfile import OwnersEntry
-from mapspeak.skills.steps import Step, StepKind, find_names
-
-if TYPE_CHECKING:
-    from mapspeak.skills.missionrunner import MissionRunner
+from mapspeak.skills.steps import Mission, Step, StepKind, find_names
 
 MOST_DRIVES = 1000
 MOST_NESTED = 5
@@ -44,20 +40,6 @@ DRIVING = frozenset({"drive", "look"})
 MOST_TOLD = 160
 """Letters of the steps that a person is asked about; the tree has them all."""
 FindSkill = Callable[[str], Skill]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mission(Skill):
-    """A skill that is a tree of skills.
-
-    Attributes:
-        remember: Remarks of people about it since it was saved.
-        path: The file that it is saved in; None for one that is not.
-    """
-
-    tree: Step
-    remember: tuple[str, ...] = ()
-    path: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +72,6 @@ class MissionBounds:
 
 KnownBounds = dict[tuple[str, int], MissionBounds]
 """By the mission's name and the count of missions above it."""
-# State of a task, not of the module: within a mission, the missions in it as they were approved.
-_PARTS: ContextVar[Mapping[str, Mission] | None] = ContextVar("parts", default=None)
 
 
 @dataclass(eq=False)
@@ -112,7 +92,7 @@ class MissionDesk:
     record: MissionRecord
     present: Callable[[], AbstractContextManager[None]] = nullcontext
     begins: Callable[[], None] = lambda: None
-    latest: "MissionRunner | None" = None
+    latest: MissionRunner | None = None
 
     def check(
         self, mission: Mission, above: tuple[str, ...] = (), known: KnownBounds | None = None
@@ -202,7 +182,7 @@ class MissionDesk:
     async def _run(
         self, mission: Mission, arguments: Arguments, on_progress: OnProgress
     ) -> SkillOutcome:
-        """Run a mission; within another mission it is a part of that one.
+        """Run a mission.
 
         Raises:
             ApprovalNeededError: A person has to agree to it first, once for all of it.
@@ -211,9 +191,6 @@ class MissionDesk:
         """
         spec = mission.spec
         given = check_arguments(spec.parameters, arguments, skill=spec.name)
-        if _PARTS.get() is not None:
-            part = self._build_runner(mission, given, on_progress)
-            return await self.gate.run_once(spec, part.run, command=None)
         if self.latest is not None and not self.latest.is_over:
             raise SkillError(
                 "Another mission is under way; there is one at a time.",
@@ -221,9 +198,8 @@ class MissionDesk:
             )
         bounds = self.check(mission)
         scope, guard = _scope_of(mission, given, bounds), self.gate.guard
-        self.latest = runner = self._build_runner(mission, given, on_progress)
+        self.latest = runner = self._build_runner(mission, given, on_progress, bounds.parts)
         self.begins()
-        token = _PARTS.set(bounds.parts)
         try:
             acting = replace(current_caller(), mission=spec.name)
             with self.present(), within_scope(scope), calling(acting):
@@ -237,11 +213,10 @@ class MissionDesk:
                 )
         finally:
             runner.is_over = True
-            _PARTS.reset(token)
             if guard is not None:
                 guard.end_scope(scope)
 
-    async def _run_recorded(self, runner: "MissionRunner") -> SkillOutcome:
+    async def _run_recorded(self, runner: MissionRunner) -> SkillOutcome:
         said = "cut off"
         self.record.begin(runner.mission.spec.name)
         try:
@@ -252,23 +227,36 @@ class MissionDesk:
         return outcome
 
     def _build_runner(
-        self, mission: Mission, given: Arguments, on_progress: OnProgress
-    ) -> "MissionRunner":
-        # Loads py_trees: a server that runs no mission does without.
-        from mapspeak.skills.missionrunner import MissionRunner  # noqa: PLC0415
-
+        self,
+        mission: Mission,
+        given: Arguments,
+        on_progress: OnProgress,
+        parts: Mapping[str, Mission],
+    ) -> MissionRunner:
+        """Return what runs a mission with the missions within it as they were approved."""
         return MissionRunner(
             mission=mission,
             given=given,
-            find_skill=self._find_part,
+            find_skill=partial(self._find_part, parts),
             facts=self.gate.facts,
             on_progress=on_progress,
             on_step=self.record.note,
         )
 
-    def _find_part(self, name: str) -> Skill:
-        """Return a skill; a mission as it was approved, whatever its file says by now."""
-        return (_PARTS.get() or {}).get(name) or self.find_skill(name)
+    def _find_part(self, parts: Mapping[str, Mission], name: str) -> Skill:
+        part = parts.get(name)
+        return self.find_skill(name) if part is None else self._within(part, parts)
+
+    def _within(self, part: Mission, parts: Mapping[str, Mission]) -> Skill:
+        """Return a mission as a part of another one, approved and recorded with that one."""
+        spec = part.spec
+
+        async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
+            given = check_arguments(spec.parameters, arguments, skill=spec.name)
+            runner = self._build_runner(part, given, on_progress, parts)
+            return await self.gate.run_once(spec, runner.run, command=None)
+
+        return Skill(spec, run)
 
     def _needs_word(self, spec: SkillSpec, bounds: MissionBounds) -> bool:
         """Return True where any part of it would need a person's word by itself."""

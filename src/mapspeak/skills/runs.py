@@ -21,7 +21,7 @@ from mapspeak.skill import (
     SkillProgress,
     SkillState,
 )
-from mapspeak.skills.mission import Mission
+from mapspeak.skills.steps import Mission
 
 MOST_PICTURES = 12
 MOST_KEPT = 200

@@ -5,13 +5,14 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import SkillError
-from mapspeak.skill import Arguments, JsonValue, SkillSpec
+from mapspeak.skill import Arguments, JsonValue, Skill, SkillSpec
 from mapspeak.skills.arguments import plain
 
 TEMPLATE = re.compile(r"\{([a-z][a-z0-9_]*)(?:\.([A-Za-z0-9_]+))?\}")
@@ -84,6 +85,20 @@ class Step:
         if first in self.arguments:
             raise SkillError(f"{spec.name} is given {first} twice.", hint="Leave one out.")
         return {first: self.main, **self.arguments}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mission(Skill):
+    """A skill that is a tree of skills.
+
+    Attributes:
+        remember: Remarks of people about it since it was saved.
+        path: The file that it is saved in; None for one that is not.
+    """
+
+    tree: Step
+    remember: tuple[str, ...] = ()
+    path: Path | None = None
 
 
 CONTROL = frozenset(StepKind) - {StepKind.LEAF}
@@ -205,24 +220,16 @@ def _leaf(written: Mapping[str, Any], number: int) -> Step:
     )
 
 
-def _plain(value: object, depth: int = 0) -> JsonValue:
+def _plain(value: object) -> JsonValue:
     """Return a value of YAML without what its reader adds.
 
     Raises:
-        SkillError: It is nested too deep, as a value that contains itself is.
+        SkillError: It holds itself, or is nested too deep.
     """
-    if depth > DEEPEST:
-        raise _fault(value, "an argument is nested too deep")
-    match value:
-        case Mapping():
-            return {str(key): _plain(each, depth + 1) for key, each in value.items()}
-        case list():
-            return [_plain(each, depth + 1) for each in value]
-        case bool() | None:
-            return value
-        case int() | float():
-            return int(value) if isinstance(value, int) else float(value)
-    return str(value)
+    try:
+        return json.loads(json.dumps(value, default=str))
+    except (ValueError, RecursionError) as error:
+        raise _fault(value, "an argument holds itself, or is nested too deep") from error
 
 
 def _name(name: object, written: object) -> str:

@@ -7,10 +7,10 @@ from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
 from mapspeak.skill import Arguments, JsonValue, Skill, SkillCode, SkillEffect, SkillSpec
 from mapspeak.skills.arguments import say_wanted
-from mapspeak.skills.mission import Mission, MissionBounds
+from mapspeak.skills.mission import MissionBounds
 from mapspeak.skills.missionrecord import Interrupted
 from mapspeak.skills.runs import Question, QuestionBook
-from mapspeak.skills.steps import Step, StepKind
+from mapspeak.skills.steps import Mission, Step, StepKind
 
 MOST_SENTENCE = 300
 MOST_WORDS = 80

@@ -14,11 +14,11 @@ from mapspeak.server.tools.skills.leaves import Leaves, SessionFacts
 from mapspeak.session import Session
 from mapspeak.skill import Skill
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.mission import Mission, MissionDesk
+from mapspeak.skills.mission import MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
 from mapspeak.skills.runs import QuestionBook
 from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
-from mapspeak.skills.steps import CONTROL
+from mapspeak.skills.steps import CONTROL, Mission
 
 logger = logging.getLogger(__name__)
 

@@ -25,7 +25,7 @@ from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
-from mapspeak.skills.mission import Mission, MissionBounds
+from mapspeak.skills.mission import MissionBounds
 from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
@@ -36,7 +36,7 @@ from mapspeak.skills.skillsfile import (
     set_aside,
     write_skills,
 )
-from mapspeak.skills.steps import StepKind, fill_in, find_names, parse_tree
+from mapspeak.skills.steps import Mission, StepKind, fill_in, find_names, parse_tree
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_ARGUMENTS = 20
