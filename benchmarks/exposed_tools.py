@@ -167,7 +167,7 @@ async def _time_listing() -> float:
                     timeout_s=1.0,
                     parameters=build_layout(book, name).parameters,
                 )
-                server.skills.put_up(Skill(spec, _do_nothing))
+                server.book.exposed[spec.name] = Skill(spec, _do_nothing)
             taken_ms: list[float] = []
             async with Client(server) as client:
                 for _ in range(N_LISTINGS):

@@ -342,7 +342,7 @@ async def test_the_skills_of_a_client_that_is_gone_end_though_the_robot_is_out_o
         tasks.start_soon(server.keep_skills)
         await anyio.wait_all_tasks_blocked()
         with calling(Caller(session="mine")):
-            run = await server.skills.runs.begin(FakeSkill(spec(), do=never), {}, wait_s=0.0)
+            run = await server.book.runs.begin(FakeSkill(spec(), do=never), {}, wait_s=0.0)
         with calling(Caller(session="mine")), session.drives.preparing() as ticket:
             goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
             await session.drives.start(goal.pose, place=goal.name, ticket=ticket)

@@ -25,7 +25,6 @@ from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
     from mapspeak.server.tools.skills.book import SkillBook
-    from mapspeak.skills.runs import SkillRuns
     from mapspeak.skills.skillsfile import OwnersEntry
 
 ROBOT_OPTION = click.option(
@@ -100,10 +99,9 @@ def _load(file: Path) -> "tuple[OwnersEntry, ...]":
 @asynccontextmanager
 async def _open(
     entries: "tuple[OwnersEntry, ...]", robot: str, guard: GuardChoice
-) -> "AsyncGenerator[tuple[SkillBook, SkillRuns]]":
+) -> "AsyncGenerator[SkillBook]":
     from mapspeak.server.tools.ros.goals import RosAccess  # noqa: PLC0415
     from mapspeak.server.tools.skills.book import SkillBook  # noqa: PLC0415
-    from mapspeak.skills.runs import SkillRuns  # noqa: PLC0415
 
     start = RobotStart(choice=RobotChoice(robot=robot), memory=None, guard=guard)
     async with AsyncExitStack() as links:
@@ -115,11 +113,10 @@ async def _open(
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(session.keep_watch)
             book = SkillBook(session, RosAccess(session), entries)
-            runs = SkillRuns(questions=book.questions)
-            tasks.start_soon(runs.keep_going, anyio.sleep_forever)
+            tasks.start_soon(book.runs.keep_going, anyio.sleep_forever)
             await anyio.lowlevel.checkpoint()
             try:
-                yield book, runs
+                yield book
             finally:
                 with anyio.CancelScope(shield=True):
                     await session.close()
@@ -127,7 +124,7 @@ async def _open(
 
 
 async def _check(entries: "tuple[OwnersEntry, ...]", robot: str) -> None:
-    async with _open(entries, robot, GuardChoice()) as (book, _):
+    async with _open(entries, robot, GuardChoice()) as book:
         faults = {each.spec.name: await book.check_entry(each) for each in entries}
     for name, fault in faults.items():
         click.echo(f"{name}: {fault or 'offered'}")
@@ -145,14 +142,14 @@ async def _try(
     robot: str,
     guard: GuardChoice,
 ) -> None:
-    from mapspeak.server.tools.skills.board import say_run  # noqa: PLC0415
+    from mapspeak.server.tools.skills.calling import say_run  # noqa: PLC0415
     from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
     from mapspeak.skill import SkillState  # noqa: PLC0415
 
-    async with _open(entries, robot, guard) as (book, runs):
+    async with _open(entries, robot, guard) as book:
         skill = book.find(name)
         given = read_values(skill.spec, list(arguments))
-        run = await runs.begin(skill, given, wait_s=skill.spec.timeout_s)
-        click.echo(say_run(run, book.questions))
+        run = await book.runs.begin(skill, given, wait_s=skill.spec.timeout_s)
+        click.echo(say_run(run, book.runs.questions))
     if run.state is not SkillState.SUCCEEDED:
         sys.exit(1)

@@ -2,8 +2,7 @@
 
 import json
 import logging
-from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import anyio
@@ -36,8 +35,8 @@ from mapspeak.server.text.offered import (
 from mapspeak.server.text.wording import show_controls
 from mapspeak.server.tools.caller import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess
-from mapspeak.server.tools.skills.board import SkillBoard
 from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.calling import call_skill
 from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import (
@@ -50,7 +49,6 @@ from mapspeak.server.toolsets import (
 from mapspeak.server.view.chat import VIEW_MAP, ChatView, make_apps, offer_page
 from mapspeak.server.wire.calllog import CallNoting
 from mapspeak.session import Session
-from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import OwnersEntry
 
 logger = logging.getLogger(__name__)
@@ -70,8 +68,7 @@ class MapspeakServer(MCPServer[Any]):
         call_log: Where every call is noted; None for nowhere.
 
     Attributes:
-        book: Of all its skills.
-        skills: The tools that come and go.
+        book: Of all its skills; those of them that are tools come and go.
         subscribers: The clients to notify of these changes.
         exposure: Looks for those that the robot offers; None without patterns.
     """
@@ -79,7 +76,6 @@ class MapspeakServer(MCPServer[Any]):
     def __init__(
         self,
         session: Session,
-        runs: SkillRuns,
         book: SkillBook,
         known: Mapping[str, Sequence[Tool]],
         *,
@@ -100,29 +96,29 @@ class MapspeakServer(MCPServer[Any]):
         self._call_log, self._known = call_log, known
         self._offered: dict[str, Tool] = {}
         self._remarks = Remarks(session)
-        self.skills = SkillBoard(runs, others=lambda: self._offered)
+        self._told = book.list_tools()
         self.subscribers = ToolListSubscribers(self)
         self.exposure: Exposure | None = None
 
     @property
-    def n_tools(self) -> int:
-        """The number of offered tools."""
-        return len(self._offered)
+    def tool_names(self) -> Collection[str]:
+        """The names of the offered tools that are no skills."""
+        return self._offered
 
     def expose(self, ros: RosAccess, patterns: tuple[str, ...]) -> None:
         """Look for interfaces of the robot with some names, once `keep_skills` runs."""
-        self.exposure = Exposure(ros, self.skills, patterns, tell=self.tell_changes)
+        self.exposure = Exposure(ros, self.book, patterns, tell=self.tell_changes)
 
     async def tell_changes(self) -> None:
         """Tell clients that skills have become tools, have changed or are none any more."""
-        if self.skills.is_changed:
-            self.skills.is_changed = False
+        if (listed := self.book.list_tools()) != self._told:
+            self._told = listed
             await self.subscribers.tell()
 
     async def keep_skills(self) -> None:
         """Let skills run, and look for those that the robot offers, until cancelled."""
         work = anyio.sleep_forever if self.exposure is None else self.exposure.keep_looking
-        await self.skills.runs.keep_going(work)
+        await self.book.runs.keep_going(work)
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
@@ -207,8 +203,8 @@ class MapspeakServer(MCPServer[Any]):
     async def _run(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
-        if name in self.skills.skills:
-            return await self.skills.call(name, arguments, context)
+        if (skill := self.book.offered.get(name)) is not None:
+            return await call_skill(skill, arguments, runs=self.book.runs, context=context)
         if name not in self._offered and (toolsets := self._find_toolsets(name)):
             raise ToolError(say_not_offered(name, toolsets))
         try:
@@ -279,7 +275,7 @@ class MapspeakServer(MCPServer[Any]):
             await self._session.client_is_gone(client)
         except LinkError as error:
             logger.warning("The robot could not be stopped yet: %s", error)
-        await self.skills.runs.client_is_gone(client)
+        await self.book.runs.client_is_gone(client)
 
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None
@@ -300,7 +296,7 @@ class MapspeakServer(MCPServer[Any]):
             for tool in listed
             if tool.name != VIEW_MAP
         ]
-        return [*lean, *self.skills.listed]
+        return [*lean, *self.book.list_tools()]
 
 
 def _read_arguments(tool: Tool, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -366,27 +362,20 @@ def build_server(
     elif session.ros is not None:
         session.ros.advertise_early()
     book = SkillBook(session, ros := RosAccess(session), skills)
-    runs = SkillRuns(partial(_count_stops, session), book.questions)
-    known = build_toolsets(session, representation, ros=ros, runs=runs, book=book)
+    known = build_toolsets(session, representation, ros=ros, book=book)
     sets = {*toolsets} | ({"skills"} if expose or skills else set())
     tools = {*tools} | ({STOP} if expose or skills else set())
     chosen = choose_tools(known, toolsets=sets, tools=tools, is_read_only=is_read_only)
-    with offering({tool.name for tool in chosen}):
+    names = {tool.name for tool in chosen}
+    if sets & {"skills", "missions"}:
+        book.offer(beside=names, is_read_only=is_read_only)
+    with offering(names):
         moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
         told = write_instructions(moves=moves)
-        server = MapspeakServer(session, runs, book, known, instructions=told, call_log=call_log)
-        server.skills.is_read_only = is_read_only
+        server = MapspeakServer(session, book, known, instructions=told, call_log=call_log)
         for tool in chosen:
             server.offer(tool)
-    if sets & {"skills", "missions"}:
-        book.put_up(server.skills)
     if expose:
         server.expose(ros, tuple(expose))
-    add_prompts(server, {tool.name for tool in chosen})
+    add_prompts(server, names)
     return server
-
-
-def _count_stops(session: Session) -> int:
-    """Return a number that changes when the robot is stopped or held."""
-    is_held = session.guard is not None and session.guard.hold.read() is not None
-    return 2 * session.drives.n_stops + is_held

@@ -43,7 +43,7 @@ class FleetServer(MCPServer[Any]):
             raise ConfigError("There is no robot to serve.", hint="Name one with --robot.")
         names = ", ".join(servers)
         # All have the same toolsets; a policy may leave some of one robot's tools out.
-        fullest = max(servers.values(), key=lambda server: server.n_tools)
+        fullest = max(servers.values(), key=lambda server: len(server.tool_names))
         super().__init__(
             "mapspeak",
             title="mapspeak: robots' maps, eyes and memories of places",
@@ -57,7 +57,7 @@ class FleetServer(MCPServer[Any]):
         self._subscribers = ToolListSubscribers(self)
         for server in servers.values():
             server.subscribers.pass_on(self._subscribers.tell)
-        add_prompts(self, fullest.skills.taken_names)
+        add_prompts(self, fullest.tool_names)
 
     async def _handle_list_tools(
         self, ctx: ServerRequestContext[Any], params: PaginatedRequestParams | None

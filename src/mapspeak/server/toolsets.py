@@ -30,12 +30,11 @@ from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
 from mapspeak.server.tools.routes import RouteTools
-from mapspeak.server.tools.skills.board import SkillRunTools
 from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.calling import SkillRunTools
 from mapspeak.server.tools.skills.missions import MissionTools
 from mapspeak.server.tools.toolset import Tool, ToolEffect, tools_of
 from mapspeak.session import Session
-from mapspeak.skills.runs import SkillRuns
 
 STOP = "stop_robot"
 IN_PAPERS_PROMPTS = ("navigate_to", "wait_for_goal", "look_through_camera")
@@ -48,7 +47,6 @@ def build_toolsets(
     session: Session,
     representation: Representation = Representation.PICTURE_TABLE,
     ros: RosAccess | None = None,
-    runs: SkillRuns | None = None,
     book: SkillBook | None = None,
 ) -> dict[str, list[Tool]]:
     """Return every toolset by its name, in the order in which tools are listed.
@@ -57,14 +55,13 @@ def build_toolsets(
         session: The session of the tools.
         representation: How look_at_map shows the map.
         ros: Its way to a ROS system, where there is one.
-        runs: The runs of its skills.
         book: Its skills.
     """
-    find, ros, runs = FindTools(session), ros or RosAccess(session), runs or SkillRuns()
+    find, ros = FindTools(session), ros or RosAccess(session)
     look = tools_of(LookTools(session, representation))
     drive, paper = tools_of(DriveTools(session), ViewTools(session)), tools_of(PaperTools(session))
     book = book or SkillBook(session, ros)
-    run_tools = SkillRunTools(runs)
+    run_tools = SkillRunTools(book.runs)
     return {
         "look": look,
         "places": tools_of(find, PlaceTools(session)),
@@ -81,7 +78,7 @@ def build_toolsets(
             NodeTools(ros),
         ),
         "skills": tools_of(run_tools),
-        "missions": tools_of(MissionTools(book, runs), run_tools),
+        "missions": tools_of(MissionTools(book), run_tools),
     }
 
 

@@ -21,10 +21,9 @@ from mapspeak.rosbridge_server.hub import Topic
 from mapspeak.safety import CommandKind, Patterns, Policy
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import RosInquiry
-from mapspeak.server.tools.skills.board import SkillBoard
+from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.session import Session
-from mapspeak.skills.runs import SkillRuns
 from rosserved import QUICK, time_passing
 
 pytestmark = pytest.mark.anyio
@@ -314,15 +313,15 @@ async def test_a_robot_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> No
 
     session = Session(FakeRobot(), SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
     ros = RosAccess(session, Absent(session))
-    board = SkillBoard(SkillRuns(), others=tuple)
+    book = SkillBook(session, ros)
 
     async def tell() -> None:
         raise AssertionError("nothing has changed")
 
-    exposure = Exposure(ros, board, ("/tool/*",), tell=tell, every_s=0.0)
+    exposure = Exposure(ros, book, ("/tool/*",), tell=tell, every_s=0.0)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(exposure.keep_looking)
         while n_asked < 3:
             await anyio.lowlevel.checkpoint()
         tasks.cancel_scope.cancel()
-    assert not board.skills
+    assert not book.exposed

@@ -381,6 +381,18 @@ skills:
     assert "succeeded" in held
 
 
+async def test_what_an_owner_says_of_a_skill_of_the_robot_holds_for_the_tool_of_that_name(
+    tmp_path: Path,
+) -> None:
+    percent = SkillParameter("until_percent", ParameterKind.NUMBER)
+    dock = FakeSkill(spec("dock", parameters=(percent,)))
+    written = "skills:\n- {name: dock, robot_skill: dock, fixed: {until_percent: 80}}\n"
+    async with missions(tmp_path, dock, skills_file=written) as caller:
+        await caller.ask("dock")
+        await caller.ask("run_mission", tree="- dock\n")
+    assert dock.given == [{"until_percent": 80}, {"until_percent": 80}]
+
+
 async def test_a_description_that_gives_orders_is_quoted_as_somebodys_words(
     tmp_path: Path,
 ) -> None:

@@ -174,8 +174,8 @@ class PersonCommands:
         book = self._feed.book
         if book is None:
             raise GoalError("This robot runs no missions.", hint="Nothing was answered.")
-        question = book.questions.find(answering.question, client=None)
-        taken = book.questions.answer(question, answering.answer)
+        question = book.runs.questions.find(answering.question, client=None)
+        taken = book.runs.questions.answer(question, answering.answer)
         said = f"{question.id} is answered: {taken}."
         if self._session.guard is not None:
             self._note("answer", said)

@@ -231,7 +231,7 @@ def _describe_missions(book: SkillBook) -> MissionsView:
                 answers=each.answers,
                 picture="" if each.picture is None else f"questions/{each.id}",
             )
-            for each in book.questions.waiting
+            for each in book.runs.questions.waiting
             if each.answer is None
         ),
         saved=tuple(draw_mission(each) for each in book.saved.values()),

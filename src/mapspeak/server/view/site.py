@@ -206,7 +206,7 @@ class LiveSite:
     async def show_question(self, request: Request) -> Response:
         """Answer with the picture that a waiting question is about."""
         book = self._find(request).book
-        waiting = () if book is None else book.questions.waiting
+        waiting = () if book is None else book.runs.questions.waiting
         wanted = request.path_params["question"]
         picture = next((each.picture for each in waiting if each.id == wanted), None)
         if picture is None:

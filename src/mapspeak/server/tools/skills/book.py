@@ -1,22 +1,24 @@
 """All skills of one server by their names: built in, the robot's own, its owner's, missions."""
 
 import logging
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
+
+from mcp_types import Tool as ListedTool
 
 from mapspeak.errors import ConfigError, MapspeakError, SkillError, say_nearest
 from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
-from mapspeak.server.tools.skills.board import SkillBoard
+from mapspeak.server.tools.skills.calling import list_skill
 from mapspeak.server.tools.skills.interfaces import Interface, open_interface
 from mapspeak.server.tools.skills.leaves import Leaves, SessionFacts
 from mapspeak.session import Session
-from mapspeak.skill import Skill
+from mapspeak.skill import Skill, SkillEffect
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.mission import MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.runs import QuestionBook
+from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
 from mapspeak.skills.steps import CONTROL, Mission
 
@@ -24,7 +26,7 @@ logger = logging.getLogger(__name__)
 
 
 class SkillBook:
-    """Knows every skill, and keeps saved missions as files.
+    """Knows every skill, keeps saved missions as files, and tells which skills are tools.
 
     Args:
         session: Whose robot it is.
@@ -33,10 +35,11 @@ class SkillBook:
 
     Attributes:
         session: The same.
-        questions: Those that missions ask.
+        runs: Runs the skills.
         desk: Runs missions.
         folder: Where missions are saved.
         saved: The missions that were saved, by name.
+        exposed: The interfaces of the robot that are tools now, by the names of these.
         interrupted: Missions that an earlier server did not live to end.
     """
 
@@ -44,8 +47,11 @@ class SkillBook:
         self, session: Session, ros: RosAccess, entries: Sequence[OwnersEntry] = ()
     ) -> None:
         self._ros, self.session = ros, session
-        self._board: SkillBoard | None = None
-        self.questions = QuestionBook()
+        self.runs = SkillRuns(partial(_count_stops, session))
+        self.exposed: dict[str, Skill] = {}
+        self._tools: Collection[str] = ()
+        self._are_tools = self._is_read_only = False
+        self._listed: dict[Skill, ListedTool] = {}
         self.folder = memory_folder(session.memory.path) / "missions"
         record = MissionRecord(self.folder / "record.jsonl", wall_clock=session.find_wall_time)
         self.interrupted = record.take_interrupted()
@@ -53,9 +59,9 @@ class SkillBook:
             logger.warning("The mission %s was interrupted: its server ended.", each.name)
         facts = SessionFacts(session, ros)
         self._gate = SkillGate(facts, session.guard)
-        present, begins = session.client_is_heard, self.questions.forget_pictures
+        present, begins = session.client_is_heard, self.runs.questions.forget_pictures
         self.desk = MissionDesk(self.find, self._gate, record, present, begins)
-        leaves = Leaves(session, facts, self.questions).list_skills()
+        leaves = Leaves(session, facts, self.runs.questions).list_skills()
         self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
         own = () if session.skilled is None else session.skilled.build_skills(session.robot)
         self._own = _by_name(self._gate.hold(each) for each in own)
@@ -71,8 +77,23 @@ class SkillBook:
     @property
     def skills(self) -> Mapping[str, Skill]:
         """All that a mission can use, with the interfaces that are exposed now."""
-        exposed = {} if self._board is None else self._board.skills
-        return {**exposed, **self._own, **self._owned, **self.saved, **self._built_in}
+        return {**self.exposed, **self._own, **self._owned, **self.saved, **self._built_in}
+
+    @property
+    def offered(self) -> Mapping[str, Skill]:
+        """Those that are tools of their own."""
+        theirs = {**self._own, **self._owned, **self.saved} if self._are_tools else {}
+        return {
+            name: each
+            for name, each in {**theirs, **self.exposed}.items()
+            if name not in self._tools
+            and (each.spec.effect is SkillEffect.READS or not self._is_read_only)
+        }
+
+    @property
+    def taken_names(self) -> set[str]:
+        """The names of all tools."""
+        return {*self._tools, *self.offered}
 
     def find(self, name: str) -> Skill:
         """Return a skill by its name.
@@ -87,31 +108,30 @@ class SkillBook:
             raise SkillError(f"There is no skill {name[:60]!r}.", hint=hint)
         return found
 
-    def put_up(self, board: SkillBoard) -> None:
+    def offer(self, *, beside: Collection[str], is_read_only: bool) -> None:
         """Offer the robot's own skills, the owner's and the saved missions as tools.
 
-        Raises:
-            ConfigError: An owner's skill is called as a tool.
-        """
-        self._board = board
-        for skill in self._owned.values():
-            try:
-                board.put_up(skill)
-            except SkillError as error:
-                raise ConfigError(f"skills.yaml: {error.message}", hint=error.hint) from error
-        for skill in (*self._own.values(), *self.saved.values()):
-            self._offer(skill)
-        # No client has seen others.
-        board.is_changed = False
+        Args:
+            beside: The names of the tools that are no skills; a skill of such a name is no tool.
+            is_read_only: Only skills that read are tools.
 
-    def _offer(self, skill: Skill) -> None:
-        """Offer a skill as a tool once there is a board; one that is called as a tool is none."""
-        if self._board is None:
-            return
-        try:
-            self._board.put_up(skill)
-        except SkillError as error:
-            logger.warning("%s", error)
+        Raises:
+            ConfigError: An owner's skill has such a name.
+        """
+        self._tools, self._is_read_only, self._are_tools = beside, is_read_only, True
+        for name in (*self._owned, *self._own):
+            if name in beside:
+                said = f"{name!r} is a tool, and no skill's name."
+                if name in self._owned:
+                    raise ConfigError(f"skills.yaml: {said}", hint="Rename it.")
+                logger.warning("%s", said)
+        self.load_saved()
+
+    def list_tools(self) -> list[ListedTool]:
+        """Return the offered skills as clients are told of them."""
+        skills = self.offered.values()
+        self._listed = {each: self._listed.get(each) or list_skill(each) for each in skills}
+        return list(self._listed.values())
 
     def load_saved(self) -> None:
         """Read the saved missions anew; people may have edited the files.
@@ -132,22 +152,16 @@ class SkillBook:
                     logger.warning("%s: %s", path, error)
                     continue
                 saved[each.name] = self.desk.open(each, path)
-        before, self.saved = self.saved, saved
-        if self._board is not None:
-            for name in before.keys() - self.saved.keys():
-                self._board.take_down(name)
-        for mission in self.saved.values():
-            self._offer(mission)
+        self.saved = saved
 
     def check_free(self, name: str) -> None:
         """Return when a mission may be saved under a name.
 
         Raises:
-            SkillError: Another skill, or a word of the language of missions, has it.
+            SkillError: A tool, another skill, or a word of the language of missions, has it.
         """
-        taken = {*self._built_in, *self._own, *self._owned, *CONTROL}
-        tools = () if self._board is None else self._board.taken_names
-        if name in taken or (name in tools and name not in self.saved):
+        others = (self._built_in, self._own, self._owned, self.exposed)
+        if any(name in each for each in (*others, CONTROL, self._tools)):
             raise SkillError(f"{name!r} is taken.", hint="Choose another name.")
 
     def _open(self, entry: OwnersEntry) -> Skill:
@@ -202,3 +216,9 @@ class SkillBook:
 
 def _by_name(skills: Iterable[Skill]) -> dict[str, Skill]:
     return {each.spec.name: each for each in skills}
+
+
+def _count_stops(session: Session) -> int:
+    """Return a number that changes when the robot is stopped or held."""
+    is_held = session.guard is not None and session.guard.hold.read() is not None
+    return 2 * session.drives.n_stops + is_held

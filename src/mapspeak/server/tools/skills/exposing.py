@@ -17,8 +17,10 @@ from mapspeak.safety import GuardedConnection
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import actions_of
 from mapspeak.server.tools.ros.services import find_folded
-from mapspeak.server.tools.skills.board import RESERVED, SkillBoard, name_tool
+from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.calling import RESERVED, name_tool
 from mapspeak.server.tools.skills.interfaces import Interface, open_interface
+from mapspeak.skill import Skill
 from mapspeak.skills.skillsfile import Called
 
 MOST_EXPOSED = 100
@@ -35,26 +37,25 @@ logger = logging.getLogger(__name__)
 
 @dataclass(eq=False)
 class Exposure:
-    """Keeps the board in step with the robot's interfaces of some names.
+    """Keeps the exposed skills of a book in step with the robot's interfaces of some names.
 
     Attributes:
         ros: The way to the robot.
-        board: Where the tools are put up.
+        book: Of all skills.
         patterns: Of full names, as the shell writes them: "/gripper/*".
         tell: Tells clients where tools have changed.
         every_s: Between two looks.
-        kept_s: For which an answer is kept, and one that could not be put up is left out.
+        kept_s: For which an answer is kept, and one that could not be opened is left out.
     """
 
     ros: RosAccess
-    board: SkillBoard
+    book: SkillBook
     patterns: tuple[str, ...]
     _: KW_ONLY
     tell: Callable[[], Awaitable[None]]
     every_s: float = EVERY_S
     kept_s: float = KEPT_S
-    _offered: dict[Interface, str] = field(default_factory=dict)
-    _left_out: dict[Interface, float] = field(default_factory=dict)
+    _tried: dict[Interface, Skill | float] = field(default_factory=dict)
     _answers: dict[tuple[Called, str], tuple[list[Interface], float]] = field(default_factory=dict)
 
     async def keep_looking(self) -> None:
@@ -72,43 +73,47 @@ class Exposure:
     def forget(self) -> None:
         """Ask for everything anew with the next look: the robot may be another one."""
         self._answers.clear()
-        self._left_out.clear()
+        opened = self._tried.items()
+        self._tried = {each: found for each, found in opened if isinstance(found, Skill)}
+
+    @property
+    def _skills(self) -> list[Skill]:
+        return [found for found in self._tried.values() if isinstance(found, Skill)]
 
     async def look(self) -> None:
-        """Put up new interfaces, take down those that are gone, and tell clients of any change.
+        """Expose new interfaces, withdraw those that are gone, and tell clients of any change.
 
         Raises:
             LinkError: The robot cannot be asked.
         """
         found = await self._find()
-        for gone in [each for each in self._offered if each not in found]:
-            self.board.take_down(self._offered.pop(gone))
-        self._left_out = {each: at_s for each, at_s in self._left_out.items() if each in found}
+        before = self._tried
+        self._tried = {each: before[each] for each in found if each in before}
+        self._show()
         for interface in found:
-            if interface not in self._offered:
-                await self._offer(interface)
+            tried = self._tried.get(interface, -math.inf)
+            if isinstance(tried, float) and anyio.current_time() >= tried + self.kept_s:
+                self._tried[interface] = await self._open(interface)
+                self._show()
         await self.tell()
 
-    async def _offer(self, interface: Interface) -> None:
-        """Put up one interface; one that cannot be is tried again later, and told of once."""
-        if anyio.current_time() < self._left_out.get(interface, -math.inf) + self.kept_s:
-            return
+    def _show(self) -> None:
+        self.book.exposed = {each.spec.name: each for each in self._skills}
+
+    async def _open(self, interface: Interface) -> Skill | float:
+        """Return an interface as a skill; where it cannot be, when that was, and tell it once."""
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
-        name = name_tool(base, taken=self.board.taken_names)
+        name = name_tool(base, taken=self.book.taken_names)
         try:
-            if len(self._offered) >= MOST_EXPOSED:
+            if len(self._skills) >= MOST_EXPOSED:
                 said = f"{MOST_EXPOSED} tools are exposed already."
                 raise LinkError(said, hint="Name fewer of them.")
             self._check_policy(interface)
-            skill = await open_interface(interface, self.ros, name=name, reserved=RESERVED)
+            return await open_interface(interface, self.ros, name=name, reserved=RESERVED)
         except MapspeakError as error:
-            if interface not in self._left_out:
+            if interface not in self._tried:
                 logger.warning("%s is not exposed: %s", interface.name, error)
-            self._left_out[interface] = anyio.current_time()
-            return
-        self._left_out.pop(interface, None)
-        self.board.put_up(skill)
-        self._offered[interface] = name
+            return anyio.current_time()
 
     def _check_policy(self, interface: Interface) -> None:
         """Check that the policy does not deny an interface for its name.

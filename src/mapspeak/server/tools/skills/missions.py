@@ -20,13 +20,12 @@ from mapspeak.server.text.skills import (
     say_skills,
 )
 from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
-from mapspeak.server.tools.skills.board import say_run, tell_news
 from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.calling import say_run, tell_news
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
 from mapspeak.skills.mission import MissionBounds
-from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
     NAME,
@@ -72,9 +71,9 @@ Answer = Annotated[str | None, Field(description="left out, it shows the questio
 class MissionTools:
     """Missions: trees of skills that the server runs by itself."""
 
-    def __init__(self, book: SkillBook, runs: SkillRuns) -> None:
+    def __init__(self, book: SkillBook) -> None:
         self._book = book
-        self._runs = runs
+        self._runs = book.runs
 
     @tool(
         "Run a mission",
@@ -114,7 +113,7 @@ class MissionTools:
         given = read_values(mission.spec, values or [])
         bounds = await self._check(mission, given)
         run = await self._runs.begin(mission, given, wait_s=wait_s, on_news=tell_news(context))
-        return f"{say_bounds(mission, bounds)}\n{say_run(run, self._book.questions)}"
+        return f"{say_bounds(mission, bounds)}\n{say_run(run, self._runs.questions)}"
 
     @tool("Answer a mission", ToolEffect.REMEMBERS)
     async def answer_mission(
@@ -124,9 +123,9 @@ class MissionTools:
 
         Look at the picture before you answer; where you cannot tell, leave it to the fallback.
         """
-        found = self._book.questions.find(question, client=current_caller().session)
+        found = self._runs.questions.find(question, client=current_caller().session)
         if answer is not None:
-            taken = self._book.questions.answer(found, answer)
+            taken = self._runs.questions.answer(found, answer)
             return [f"{found.id} is answered: {taken}."]
         shown: list[str | Image] = [say_question(found)]
         if found.picture is not None:

@@ -1,7 +1,7 @@
-"""Skills as tools, put up and taken down while clients are there; the tools about their runs."""
+"""A skill as a tool: how it is listed and called; the tools about runs, and what they answer."""
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context
@@ -10,7 +10,7 @@ from mcp_types import CallToolResult, TextContent, ToolAnnotations
 from mcp_types import Tool as ListedTool
 from pydantic import Field
 
-from mapspeak.errors import MapspeakError, SkillError
+from mapspeak.errors import MapspeakError
 from mapspeak.memory.quoting import clean_line, quote
 from mapspeak.server.text.offered import lead, say_error
 from mapspeak.server.text.ros.values import cut, show_message
@@ -82,9 +82,10 @@ class SkillRunTools:
         """Cancel a run of a skill; nothing of it goes on at the robot then."""
         found = self._runs.find(run)
         if found.is_over:
-            return f"It was over already, nothing was cancelled.\n{say_run(found)}"
+            over = "It was over already, nothing was cancelled."
+            return f"{over}\n{say_run(found, self._runs.questions)}"
         await found.cancel()
-        return say_run(found)
+        return say_run(found, self._runs.questions)
 
 
 def tell_news(context: Context) -> OnNews:
@@ -98,12 +99,8 @@ def tell_news(context: Context) -> OnNews:
     return tell
 
 
-def say_run(run: SkillRun, questions: QuestionBook | None = None) -> str:
-    """Return the state of a run, with its latest progress or its result.
-
-    Args:
-        questions: Those that wait, where it is a mission that may ask some.
-    """
+def say_run(run: SkillRun, questions: QuestionBook) -> str:
+    """Return the state of a run, with its latest progress, the questions it asks, or its result."""
     progress = run.progress
     parts = [f"{run.handle} ({run.skill.spec.name}): {run.state} after {run.passed_s:.1f} s."]
     parts.append(say_remark(run.skill))
@@ -117,7 +114,7 @@ def say_run(run: SkillRun, questions: QuestionBook | None = None) -> str:
         if progress is not None and progress.values:
             shown = show_message(progress.values)
             parts.append(f"latest progress of {run.n_progress}:\n{shown}")
-        if run.is_asking and questions is not None:
+        if run.is_asking:
             parts.append(say_waiting(questions))
         parts.append(lead(GOES_ON))
     return cut("\n".join(filter(None, parts)))
@@ -155,90 +152,43 @@ def name_tool(name: str, *, taken: Collection[str] = ()) -> str:
     return next(each for each in numbered if each not in taken)
 
 
-class SkillBoard:
-    """Offers skills as tools.
+def list_skill(skill: Skill) -> ListedTool:
+    """Return a skill as clients are told of it."""
+    spec = skill.spec
+    reads = spec.effect is SkillEffect.READS
+    acts = ToolAnnotations(open_world_hint=False)
+    return ListedTool(
+        name=spec.name,
+        title=quote(spec.description or spec.name, most=MOST_TITLE).strip('"'),
+        description=describe_skill(skill),
+        input_schema=schema_of((*spec.parameters, *((WAIT,) if _is_long(skill) else ()))),
+        annotations=ToolAnnotations(read_only_hint=True) if reads else acts,
+    )
 
-    Args:
-        runs: Runs them.
-        others: The names of the tools that are no skills.
 
-    Attributes:
-        is_read_only: It takes only skills that read.
-        is_changed: Tools have come, changed or gone since clients were told.
+async def call_skill(
+    skill: Skill,
+    arguments: Mapping[str, Any],
+    *,
+    runs: SkillRuns,
+    context: Context[Any, Any] | None,
+) -> CallToolResult:
+    """Run a skill, and answer how it ended or, where it takes long, how its run is called.
+
+    Raises:
+        ToolError: It could not be begun.
     """
-
-    def __init__(self, runs: SkillRuns, *, others: Callable[[], Collection[str]]) -> None:
-        self.runs = runs
-        self.is_read_only = False
-        self.is_changed = False
-        self._others = others
-        self._offered: dict[str, tuple[Skill, ListedTool]] = {}
-
-    @property
-    def skills(self) -> Mapping[str, Skill]:
-        """The skills by the names of their tools."""
-        return {name: skill for name, (skill, _) in self._offered.items()}
-
-    @property
-    def listed(self) -> Iterable[ListedTool]:
-        """The tools as clients are told of them."""
-        return [tool for _, tool in self._offered.values()]
-
-    @property
-    def taken_names(self) -> set[str]:
-        """The names that another tool or skill has."""
-        return {*self._others(), *self._offered}
-
-    def put_up(self, skill: Skill) -> None:
-        """Offer a skill under its name, in place of one of that name.
-
-        Raises:
-            SkillError: A tool that is no skill is called so.
-        """
-        spec = skill.spec
-        if spec.name in self._others():
-            raise SkillError(f"{spec.name!r} is a tool, and no skill's name.", hint="Rename it.")
-        reads = spec.effect is SkillEffect.READS
-        if self.is_read_only and not reads:
-            return
-        acts = ToolAnnotations(open_world_hint=False)
-        tool = ListedTool(
-            name=spec.name,
-            title=quote(spec.description or spec.name, most=MOST_TITLE).strip('"'),
-            description=describe_skill(skill),
-            input_schema=schema_of((*spec.parameters, *((WAIT,) if _is_long(skill) else ()))),
-            annotations=ToolAnnotations(read_only_hint=True) if reads else acts,
+    own, wait_s = dict(arguments), LONGEST_WAIT_S
+    try:
+        if _is_long(skill):
+            given = shorten_wait(own.pop(WAIT.name, WAIT.default))
+            wait_s = check_value(WAIT, given, where=WAIT.name, what=skill.spec.name)
+        run = await runs.begin(
+            skill, own, wait_s=wait_s, on_news=None if context is None else tell_news(context)
         )
-        before = self._offered.get(spec.name)
-        self._offered[spec.name] = (skill, tool)
-        self.is_changed |= before is None or before[1] != tool
-
-    def take_down(self, name: str) -> None:
-        """Withdraw a skill; its runs go on."""
-        self.is_changed |= self._offered.pop(name, None) is not None
-
-    async def call(
-        self, name: str, arguments: Mapping[str, Any], context: Context[Any, Any] | None
-    ) -> CallToolResult:
-        """Run a skill, and answer how it ended or, where it takes long, how it is called.
-
-        Raises:
-            ToolError: It could not be begun.
-        """
-        skill, own = self._offered[name][0], dict(arguments)
-        try:
-            wait_s = LONGEST_WAIT_S
-            if _is_long(skill):
-                given = shorten_wait(own.pop(WAIT.name, WAIT.default))
-                wait_s = check_value(WAIT, given, where=WAIT.name, what=name)
-            run = await self.runs.begin(
-                skill, own, wait_s=wait_s, on_news=None if context is None else tell_news(context)
-            )
-        except MapspeakError as error:
-            raise ToolError(say_error(error)) from error
-        return CallToolResult(
-            content=[TextContent(type="text", text=say_run(run, self.runs.questions))]
-        )
+    except MapspeakError as error:
+        raise ToolError(say_error(error)) from error
+    return CallToolResult(content=[TextContent(type="text", text=say_run(run, runs.questions))])
 
 
 def _is_long(skill: Skill) -> bool:
