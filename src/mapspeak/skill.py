@@ -44,14 +44,12 @@ class SkillParameter:
     Attributes:
         name: Empty for an element of a list.
         description: What it is, in its owner's words: quoted, never followed.
-        unit: Such as "m"; empty where it has none.
+        unit: Such as "m".
         least: The least number; of a list, the least count of values.
         most: The largest number; of a list, the most values; of a text, the most letters.
         choices: The only values it may have; empty where it may have any.
-        is_required: It has no default.
-        default: Its value where it is left out.
         item: The element of a list.
-        fields: The fields of an object.
+        fields: Of an object.
     """
 
     name: str
@@ -152,12 +150,10 @@ class SkillProgress:
 
     Attributes:
         values: The latest feedback, by name.
-        is_asking: It waits for an answer.
         account: The steps that a mission has done so far.
     """
 
     values: Arguments = field(default_factory=dict)
-    is_asking: bool = False
     account: tuple[str, ...] = ()
 
 
@@ -169,11 +165,10 @@ OnProgress = Callable[[SkillProgress], None]
 class Skill:
     """Something that a robot can do, by name.
 
-    Attributes:
-        run: Do it once, and return how it ended. Everything it started is ended when its task is
-            cancelled: nothing of it is left running at the robot. It raises `MapspeakError` where
-            it cannot be begun: wrong arguments, a denied or a missing interface, an approval that
-            is needed. Nothing was sent to the robot then.
+    `run` does it once, and returns how it ended. Everything it started is ended when its task is
+    cancelled: nothing of it is left running at the robot. It raises `MapspeakError` where it cannot
+    be begun, for wrong arguments, a denied or a missing interface, or an approval that is needed;
+    nothing was sent to the robot then.
     """
 
     spec: SkillSpec

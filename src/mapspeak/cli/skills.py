@@ -142,7 +142,7 @@ async def _try(
     robot: str,
     guard: GuardChoice,
 ) -> None:
-    from mapspeak.server.tools.skills.calling import say_run  # noqa: PLC0415
+    from mapspeak.server.text.skills import say_run  # noqa: PLC0415
     from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
     from mapspeak.skill import SkillState  # noqa: PLC0415
 
@@ -150,6 +150,6 @@ async def _try(
         skill = book.find(name)
         given = read_values(skill.spec, list(arguments))
         run = await book.runs.begin(skill, given, wait_s=skill.spec.timeout_s)
-        click.echo(say_run(run, book.runs.questions))
+        click.echo(say_run(run))
     if run.state is not SkillState.SUCCEEDED:
         sys.exit(1)

@@ -91,30 +91,25 @@ class MessageLayout:
         return found
 
 
-def _read_value(parameter: SkillParameter, value: object) -> JsonValue:
+def _read_value(parameter: SkillParameter, value: Any) -> JsonValue:  # noqa: ANN401 - ROS JSON
     """Return a value of a message as its argument would be given."""
     match parameter.kind:
         case ParameterKind.OBJECT if isinstance(value, Mapping):
             inner = {each.name: each for each in parameter.fields}
             return {name: _read_value(inner[name], each) for name, each in value.items()}
-        case ParameterKind.BYTES:
-            return _read_bytes(value)
-        case ParameterKind.LIST:
-            return _read_list(parameter.item, value)
+        case ParameterKind.BYTES | ParameterKind.LIST:
+            return _read_list(
+                parameter, base64.b64decode(value) if isinstance(value, str) else value
+            )
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _read_bytes(value: object) -> JsonValue:
-    if isinstance(value, str):
-        return value
-    data = bytes(value)  # type: ignore[call-overload]
-    return base64.b64encode(data).decode() if len(data) <= MOST_TEXT else f"({len(data)} bytes)"
-
-
-def _read_list(item: SkillParameter | None, value: object) -> JsonValue:
-    if isinstance(value, str):
-        value = base64.b64decode(value)
-    listed = value.tolist() if isinstance(value, np.ndarray) else list(value)  # type: ignore[call-overload]
+def _read_list(parameter: SkillParameter, value: Any) -> JsonValue:  # noqa: ANN401 - ROS JSON
+    value = base64.b64decode(value) if isinstance(value, str) else value
+    if parameter.kind is ParameterKind.BYTES:
+        data = bytes(value)
+        return base64.b64encode(data).decode() if len(data) <= MOST_TEXT else f"({len(data)} bytes)"
+    item, listed = parameter.item, value.tolist() if isinstance(value, np.ndarray) else list(value)
     if len(listed) > MOST_LISTED:
         return f"({len(listed)} values)"
     return listed if item is None else [_read_value(item, each) for each in listed]
@@ -133,12 +128,11 @@ def build_layout(
     Raises:
         LinkError: A type within is not described, or holds itself, or there are too many.
     """
-    builder = _Builder(book)
-    message = book[bare_type(type_name)]
-    builder.check(message, above=())
-    leaves = dict(islice(builder.leaves(message, path=(), unit=""), MOST_FLAT + 1))
+    builder, way = _Builder(book), (bare_type(type_name),)
+    leaves = dict(islice(builder.leaves(way, path=(), unit=""), MOST_FLAT + 1))
     if len(leaves) > MOST_FLAT:
-        leaves = {(each.name,): builder.parameter(message, each, "") for each in message.fields}
+        fields = book[type_name].fields
+        leaves = {(each.name,): builder.parameter(way, each, "") for each in fields}
     # Where two paths joined by one low line are the same, two stand between their parts.
     glue = "_" if len({"_".join(path) for path in leaves}) == len(leaves) else "__"
     names = {path: glue.join(path) for path in leaves}
@@ -151,76 +145,57 @@ def build_layout(
 
 
 class _Builder:
+    """Makes parameters of fields; a way is the type that has the field, after those around it."""
+
     def __init__(self, book: TypeBook) -> None:
         self._book = book
         self._remarks: dict[str, Mapping[str, str]] = {}
-        self._checked: set[str] = set()
         self._n_described = 0
 
-    def check(self, message: MessageType, *, above: tuple[str, ...]) -> None:
-        """Return when all types within are described and none holds itself."""
-        if message.name in self._checked:
-            return
-        for field in message.fields:
-            if not field.is_message:
-                continue
-            inside = (*above, message.name)
-            if bare_type(field.type) in inside or len(inside) > MOST_NESTED:
-                raise LinkError(
-                    f"The type {inside[0]} holds itself, in {message.name}.{field.name}.",
-                    hint="No message can be of such a type: correct its definition.",
-                )
-            if not self._book.knows(field.type):
-                raise LinkError(
-                    f"The type {field.type} of {message.name}.{field.name} is not described.",
-                    hint="Install it where mapspeak runs, or ask a robot that tells its types.",
-                )
-            self.check(self._book[field.type], above=inside)
-        self._checked.add(message.name)
-
     def leaves(
-        self, message: MessageType, *, path: tuple[str, ...], unit: str
+        self, way: tuple[str, ...], *, path: tuple[str, ...], unit: str
     ) -> Iterator[tuple[tuple[str, ...], SkillParameter]]:
         """Yield the fields of a message that are no messages themselves, all the way down."""
-        for field in message.fields:
-            inner = self._inner(field)
+        for field in self._book[way[-1]].fields:
             where = (*path, field.name)
-            if inner is not None and field.length is None:
-                yield from self.leaves(inner, path=where, unit=self._unit(message, field, unit))
+            if _is_message(field) and field.length is None:
+                inner, its_unit = self._enter(way, field), _unit(way, field, unit)
+                yield from self.leaves(inner, path=where, unit=its_unit)
             else:
-                yield where, self.parameter(message, field, unit)
+                yield where, self.parameter(way, field, unit)
 
-    def parameter(self, message: MessageType, field: Field, unit: str) -> SkillParameter:
+    def parameter(self, way: tuple[str, ...], field: Field, unit: str) -> SkillParameter:
         """Return a field as one parameter, whatever it holds."""
         self._n_described += 1
         if self._n_described > MOST_DESCRIBED:
             raise LinkError(
-                f"A type with {message.name} within has more than {MOST_DESCRIBED} fields.",
+                f"A type with {way[-1]} within has more than {MOST_DESCRIBED} fields.",
                 hint="No model could fill it in: leave it out.",
             )
-        unit = self._unit(message, field, unit)
-        name, remark = field.name, self._remark(message, field)
+        unit, remark = _unit(way, field, unit), self._remark(self._book[way[-1]], field)
         if field.length is None:
-            return replace(self._one(field, unit), name=name, description=remark)
+            return replace(self._one(way, field, unit), name=field.name, description=remark)
         longest = field.length or field.most or MOST_LISTED
         if field.type == "uint8" and longest > MOST_IN_LIST:
-            return SkillParameter(name, ParameterKind.BYTES, description=remark, most=MOST_TEXT)
+            return SkillParameter(
+                field.name, ParameterKind.BYTES, description=remark, most=MOST_TEXT
+            )
         return SkillParameter(
-            name,
+            field.name,
             ParameterKind.LIST,
             description=remark,
             unit=unit,
             least=field.length or None,
             most=longest,
-            item=self._one(field, ""),
+            item=self._one(way, field, ""),
         )
 
-    def _one(self, field: Field, unit: str) -> SkillParameter:
+    def _one(self, way: tuple[str, ...], field: Field, unit: str) -> SkillParameter:
         """Return a field, or one of its list, as a parameter without a name."""
-        inner = self._inner(field)
-        if inner is not None:
-            fields = tuple(self.parameter(inner, each, unit) for each in inner.fields)
-            return SkillParameter("", ParameterKind.OBJECT, fields=fields)
+        if _is_message(field):
+            inner = self._enter(way, field)
+            fields = (self.parameter(inner, each, unit) for each in self._book[inner[-1]].fields)
+            return SkillParameter("", ParameterKind.OBJECT, fields=tuple(fields))
         default = self._book.default(field) if field.default and field.length is None else None
         least, most = WHOLES.get(field.type, (None, None))
         if field.type in TEXTS:
@@ -228,12 +203,19 @@ class _Builder:
         kind = _kind_of(field)
         return SkillParameter("", kind, unit=unit, least=least, most=most, default=default)
 
-    def _inner(self, field: Field) -> MessageType | None:
-        is_inner = field.is_message or field.type in TIMES
-        return self._book[field.type] if is_inner else None
-
-    def _unit(self, message: MessageType, field: Field, inherited: str) -> str:
-        return UNITS.get(message.name, {}).get(field.name, inherited)
+    def _enter(self, way: tuple[str, ...], field: Field) -> tuple[str, ...]:
+        """Return the way into a field that is a message."""
+        if field.type in way or len(way) > MOST_NESTED:
+            raise LinkError(
+                f"The type {way[0]} holds itself, in {way[-1]}.{field.name}.",
+                hint="No message can be of such a type: correct its definition.",
+            )
+        if field.is_message and not self._book.knows(field.type):
+            raise LinkError(
+                f"The type {field.type} of {way[-1]}.{field.name} is not described.",
+                hint="Install it where mapspeak runs, or ask a robot that tells its types.",
+            )
+        return (*way, field.type)
 
     def _remark(self, message: MessageType, field: Field) -> str:
         """Return the definition's comment on a field; else the constants, of an only number."""
@@ -249,6 +231,14 @@ class _Builder:
             named = ", ".join(f"{name}={value}" for name, value in message.constants.items())
             return clean_line(named)[:MOST_REMARK]
         return said
+
+
+def _is_message(field: Field) -> bool:
+    return field.is_message or field.type in TIMES
+
+
+def _unit(way: tuple[str, ...], field: Field, inherited: str) -> str:
+    return UNITS.get(way[-1], {}).get(field.name, inherited)
 
 
 def _kind_of(field: Field) -> ParameterKind:

@@ -181,13 +181,11 @@ class MissionRunner:
     def _take_progress(self, step: Step, progress: SkillProgress) -> None:
         inner = progress.account
         now = f"{step.number} {step.skill}" + (f" [{inner[-1]}]" if inner else "")
-        self._tell(now=now, is_asking=progress.is_asking, values=progress.values)
+        self._tell(now=now, values=progress.values)
 
-    def _tell(
-        self, *, now: str, is_asking: bool = False, values: Mapping[str, JsonValue] | None = None
-    ) -> None:
+    def _tell(self, *, now: str, values: Mapping[str, JsonValue] | None = None) -> None:
         told = tuple(self._account[-MOST_TOLD:]) + ((f"now: {now}",) if now else ())
-        self.on_progress(SkillProgress(values=values or {}, is_asking=is_asking, account=told))
+        self.on_progress(SkillProgress(values=values or {}, account=told))
 
 
 def _say_end(step: Step, outcome: SkillOutcome) -> str:

@@ -59,10 +59,10 @@ class Question:
 
 
 class QuestionBook:
-    """The questions that wait, the oldest first."""
+    """The questions of missions, the oldest first."""
 
     def __init__(self) -> None:
-        self.waiting: list[Question] = []
+        self._asked: list[Question] = []
         self._n_asked = 0
         self._gone: set[str] = set()
         self._pictures: OrderedDict[str, CameraPicture] = OrderedDict()
@@ -101,8 +101,17 @@ class QuestionBook:
             within_s=within_s,
             otherwise=otherwise,
         )
-        self.waiting.append(question)
+        self._asked.append(question)
         return question
+
+    def take_back(self, question: Question) -> None:
+        """Have a question wait no longer."""
+        self._asked.remove(question)
+
+    @property
+    def waiting(self) -> list[Question]:
+        """Those that no answer was given to."""
+        return [each for each in self._asked if each.answer is None]
 
     def client_is_gone(self, client: str) -> None:
         """Let anyone answer what a client would have been asked: its missions go on without it."""
@@ -118,11 +127,7 @@ class QuestionBook:
             SkillError: None waits for it, or not that one.
         """
         open_to = {"", client, *self._gone}
-        mine = [
-            each
-            for each in self.waiting
-            if each.answer is None and (client is None or each.client in open_to)
-        ]
+        mine = [each for each in self.waiting if client is None or each.client in open_to]
         for each in mine:
             if question_id is None or each.id == question_id.strip().upper():
                 return each
@@ -164,7 +169,6 @@ class SkillRun:
         handle: Its name for the model, such as "S1".
         client: It ends when that client is gone; None for a mission, which goes on.
         n_stops_before: The count of stops when it began.
-        progress: The latest; None before the first.
         outcome: None while it goes on, and where it could not be begun.
         error: Why it could not be begun.
     """
@@ -173,7 +177,8 @@ class SkillRun:
     skill: Skill
     client: str | None
     n_stops_before: int
-    progress: SkillProgress | None = None
+    questions: QuestionBook
+    progress: SkillProgress = field(default_factory=SkillProgress)
     n_progress: int = 0
     outcome: SkillOutcome | None = None
     error: MapspeakError | None = None
@@ -197,8 +202,8 @@ class SkillRun:
 
     @property
     def is_asking(self) -> bool:
-        """True while it waits for an answer."""
-        return not self.is_over and self.progress is not None and self.progress.is_asking
+        """True while it waits for an answer; missions alone ask, one at a time."""
+        return not self.is_over and isinstance(self.skill, Mission) and bool(self.questions.waiting)
 
     @property
     def passed_s(self) -> float:
@@ -263,7 +268,6 @@ class SkillRuns:
     Attributes:
         count_stops: Changes at each stop of the robot, which ends all runs but those that only
             read.
-        questions: The questions that runs ask.
     """
 
     count_stops: Callable[[], int] = lambda: 0
@@ -318,6 +322,7 @@ class SkillRuns:
             skill=skill,
             client=None if isinstance(skill, Mission) else current_caller().session,
             n_stops_before=self.count_stops(),
+            questions=self.questions,
         )
         over = [each.handle for each in self._runs.values() if each.is_over]
         for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:

@@ -232,7 +232,6 @@ def _describe_missions(book: SkillBook) -> MissionsView:
                 picture="" if each.picture is None else f"questions/{each.id}",
             )
             for each in book.runs.questions.waiting
-            if each.answer is None
         ),
         saved=tuple(draw_mission(each) for each in book.saved.values()),
     )

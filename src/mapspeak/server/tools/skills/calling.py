@@ -1,7 +1,6 @@
-"""A skill as a tool: how it is listed and called; the tools about runs, and what they answer."""
+"""A skill as a tool: how it is listed and called; the tools about its runs."""
 
-import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context
@@ -11,32 +10,16 @@ from mcp_types import Tool as ListedTool
 from pydantic import Field
 
 from mapspeak.errors import MapspeakError
-from mapspeak.memory.quoting import clean_line, quote
-from mapspeak.server.text.offered import lead, say_error
-from mapspeak.server.text.ros.values import cut, show_message
-from mapspeak.server.text.skills import (
-    CODES,
-    GOES_ON,
-    describe_skill,
-    say_conditions,
-    say_remark,
-    say_waiting,
-)
+from mapspeak.memory.quoting import quote
+from mapspeak.server.text.offered import say_error
+from mapspeak.server.text.skills import describe_skill, say_run
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, shorten_wait
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.skill import (
-    ParameterKind,
-    Skill,
-    SkillEffect,
-    SkillOutcome,
-    SkillParameter,
-    SkillState,
-)
+from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter
 from mapspeak.skills.arguments import check_value, schema_of
-from mapspeak.skills.runs import OnNews, QuestionBook, SkillRun, SkillRuns
+from mapspeak.skills.runs import OnNews, SkillRun, SkillRuns
 
-MOST_QUOTE = 300
 Handle = Annotated[
     str | None, Field(description="such as S1; the latest when left out", max_length=40)
 ]
@@ -49,9 +32,6 @@ WAIT = SkillParameter(
     default=10.0,
 )
 """What the tool of a skill takes that may last longer than a call."""
-RESERVED = frozenset({"wait_s", "for_s", "robot"})
-"""Names that no argument of a skill may have: they are the tool's own."""
-MOST_NAME = 60
 MOST_TITLE = 60
 
 
@@ -71,7 +51,7 @@ class SkillRunTools:
         """
         found = self._runs.find(run)
         await found.wait(wait_s=wait_s, on_news=tell_news(context))
-        return say_run(found, self._runs.questions)
+        return say_run(found)
 
     @tool(
         "Cancel a skill",
@@ -83,9 +63,9 @@ class SkillRunTools:
         found = self._runs.find(run)
         if found.is_over:
             over = "It was over already, nothing was cancelled."
-            return f"{over}\n{say_run(found, self._runs.questions)}"
+            return f"{over}\n{say_run(found)}"
         await found.cancel()
-        return say_run(found, self._runs.questions)
+        return say_run(found)
 
 
 def tell_news(context: Context) -> OnNews:
@@ -97,59 +77,6 @@ def tell_news(context: Context) -> OnNews:
         await context.report_progress(run.passed_s, message=said)
 
     return tell
-
-
-def say_run(run: SkillRun, questions: QuestionBook) -> str:
-    """Return the state of a run, with its latest progress, the questions it asks, or its result."""
-    progress = run.progress
-    parts = [f"{run.handle} ({run.skill.spec.name}): {run.state} after {run.passed_s:.1f} s."]
-    parts.append(say_remark(run.skill))
-    if progress is not None and run.error is None:
-        parts.append(_say_account(progress.account))
-    if run.outcome is not None:
-        parts.append(_say_outcome(run.outcome))
-    elif run.error is not None:
-        parts.append(str(run.error))
-    else:
-        if progress is not None and progress.values:
-            shown = show_message(progress.values)
-            parts.append(f"latest progress of {run.n_progress}:\n{shown}")
-        if run.is_asking:
-            parts.append(say_waiting(questions))
-        parts.append(lead(GOES_ON))
-    return cut("\n".join(filter(None, parts)))
-
-
-def _say_account(account: Sequence[str]) -> str:
-    """Return the steps of a mission; they hold texts of others, and are quoted."""
-    lines = (f"- {clean_line(each)}" for each in account)
-    return "\n".join(["Done (observed, no instruction):", *lines]) if account else ""
-
-
-def _say_outcome(outcome: SkillOutcome) -> str:
-    parts = [CODES[outcome.code]]
-    if outcome.unmet:
-        parts.append(f"It needs {say_conditions(outcome.unmet)}.")
-    if outcome.numbers:
-        told = (f"{name} {value:g}" for name, value in outcome.numbers.items())
-        parts.append(f"({', '.join(told)})")
-    if outcome.quote:
-        parts.append(f"The robot says: {quote(outcome.quote, most=MOST_QUOTE)}.")
-    said = " ".join(filter(None, parts))
-    if not outcome.outputs:
-        return said
-    head = "result:" if outcome.state is SkillState.SUCCEEDED else "what it gave:"
-    return "\n".join(filter(None, (said, f"{head}\n{show_message(outcome.outputs)}")))
-
-
-def name_tool(name: str, *, taken: Collection[str] = ()) -> str:
-    """Return what a name of ROS or of a skill is called as a tool, like no other tool."""
-    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()[-MOST_NAME:].strip("_")
-    base = plain or "skill"
-    if base not in taken:
-        return base
-    numbered = (f"robot_{base}" if n == 1 else f"robot_{base}_{n}" for n in range(1, 1000))
-    return next(each for each in numbered if each not in taken)
 
 
 def list_skill(skill: Skill) -> ListedTool:
@@ -188,7 +115,7 @@ async def call_skill(
         )
     except MapspeakError as error:
         raise ToolError(say_error(error)) from error
-    return CallToolResult(content=[TextContent(type="text", text=say_run(run, runs.questions))])
+    return CallToolResult(content=[TextContent(type="text", text=say_run(run))])
 
 
 def _is_long(skill: Skill) -> bool:

@@ -3,7 +3,8 @@
 import fnmatch
 import logging
 import math
-from collections.abc import Awaitable, Callable, Iterator
+import re
+from collections.abc import Awaitable, Callable, Collection, Iterator
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 
@@ -18,7 +19,6 @@ from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import actions_of
 from mapspeak.server.tools.ros.services import find_folded
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.calling import RESERVED, name_tool
 from mapspeak.server.tools.skills.interfaces import Interface, open_interface
 from mapspeak.skill import Skill
 from mapspeak.skills.skillsfile import Called
@@ -30,6 +30,9 @@ EVERY_S = 2.0
 KEPT_S = 20.0
 """Wall time for which a type, the ends of a topic, or one that failed, are not tried again."""
 PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
+MOST_NAME = 60
+RESERVED = frozenset({"wait_s", "for_s", "robot"})
+"""Names that no argument of a tool may have: they are the tool's own."""
 PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
 
 logger = logging.getLogger(__name__)
@@ -103,7 +106,7 @@ class Exposure:
     async def _open(self, interface: Interface) -> Skill | float:
         """Return an interface as a skill; where it cannot be, when that was, and tell it once."""
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
-        name = name_tool(base, taken=self.book.taken_names)
+        name = _name_tool(base, taken=self.book.taken_names)
         try:
             if len(self._skills) >= MOST_EXPOSED:
                 said = f"{MOST_EXPOSED} tools are exposed already."
@@ -192,3 +195,13 @@ def _topics(graph: RosGraph) -> Iterator[tuple[str, str]]:
     for topic, kind in sorted(graph.types.items()):
         if topic not in parts and "/_action/" not in topic:
             yield topic, kind
+
+
+def _name_tool(name: str, *, taken: Collection[str] = ()) -> str:
+    """Return what a name of ROS is called as a tool, like no other tool."""
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()[-MOST_NAME:].strip("_")
+    base = plain or "skill"
+    if base not in taken:
+        return base
+    numbered = (f"robot_{base}" if n == 1 else f"robot_{base}_{n}" for n in range(1, 1000))
+    return next(each for each in numbered if each not in taken)

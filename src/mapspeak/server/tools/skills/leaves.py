@@ -157,13 +157,12 @@ class SessionFacts:
         now, wanted = self.read_calendar(), words.casefold().split()
         if now is None:
             return None
-        for event in self.session.recall_events():
-            begins, until = event.find_time(now)
-            lasts = (begins is None or begins <= now) and (until is None or now < until)
-            said = f"{event.text} {event.place}".casefold()
-            if lasts and all(word in said for word in wanted):
-                return True
-        return False
+        said = (
+            f"{each.text} {each.place}".casefold()
+            for each in self.session.recall_events()
+            if each.is_current(now)
+        )
+        return any(all(word in each for word in wanted) for each in said)
 
     async def _sees(self, label: str) -> bool | None:
         if self.session.robot.description.detector is None:
@@ -372,11 +371,11 @@ class Leaves:
             within_s=given["within_s"],
             otherwise=given.get("otherwise"),
         )
-        on_progress(SkillProgress(is_asking=True))
+        on_progress(SkillProgress())
         try:
             await end_within(self.facts, given["within_s"], question.is_answered.wait)
         finally:
-            self.questions.waiting.remove(question)
+            self.questions.take_back(question)
             on_progress(SkillProgress())
         if question.answer is not None:
             return succeeded(answer=question.answer, by="answered")

@@ -17,11 +17,12 @@ from mapspeak.server.text.skills import (
     say_interrupted,
     say_mission,
     say_question,
+    say_run,
     say_skills,
 )
 from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.calling import say_run, tell_news
+from mapspeak.server.tools.skills.calling import tell_news
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
@@ -113,7 +114,7 @@ class MissionTools:
         given = read_values(mission.spec, values or [])
         bounds = await self._check(mission, given)
         run = await self._runs.begin(mission, given, wait_s=wait_s, on_news=tell_news(context))
-        return f"{say_bounds(mission, bounds)}\n{say_run(run, self._runs.questions)}"
+        return f"{say_bounds(mission, bounds)}\n{say_run(run)}"
 
     @tool("Answer a mission", ToolEffect.REMEMBERS)
     async def answer_mission(
