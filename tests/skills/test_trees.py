@@ -15,9 +15,10 @@ from mapspeak.skill import (
     SkillEffect,
     SkillParameter,
 )
+from mapspeak.skills.bounds import MissionBounds
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.mission import MissionBounds, MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.missionrunner import MissionDesk
 from mapspeak.skills.steps import Mission, Step, StepKind, fill_in, parse_tree, read_tree
 from skillmaking import FakeFacts, FakeSkill, spec
 

@@ -1,14 +1,17 @@
-"""A mission run: the steps of its tree one after the other, or at once, as tasks."""
+"""Missions run: approved once, one at a time, with their record; their steps are tasks."""
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 
 import anyio
 from anyio.lowlevel import checkpoint
 
-from mapspeak.errors import MapspeakError
+from mapspeak.errors import MapspeakError, SkillError
+from mapspeak.safety import RunSkill, calling, current_caller, within_scope
 from mapspeak.skill import (
     Arguments,
     JsonValue,
@@ -21,7 +24,11 @@ from mapspeak.skill import (
     failed,
     succeeded,
 )
-from mapspeak.skills.guarding import Facts, end_within
+from mapspeak.skills.arguments import check_arguments
+from mapspeak.skills.bounds import FindSkill, MissionBounds, MissionCheck, needs_word, scope_of
+from mapspeak.skills.guarding import SkillGate, end_within
+from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.skillsfile import OwnersEntry
 from mapspeak.skills.steps import Mission, Step, StepKind, fill_in
 
 MOST_TOLD = 40
@@ -29,26 +36,24 @@ MOST_TOLD = 40
 MOST_LINE = 300
 
 
-@dataclass(eq=False, kw_only=True)
+@dataclass(eq=False)
 class MissionRunner:
     """Runs one mission once.
 
     Attributes:
+        desk: Finds the skill of a leaf when that begins: it may have gone meanwhile.
         mission: With a tree that was checked before.
         given: Its arguments.
-        find_skill: Asked when a leaf begins: a skill may have gone meanwhile.
-        facts: Tell the time.
+        parts: The missions within it, as they were when it was approved.
         on_progress: Told of each step.
-        on_step: Writes the record; it may not raise.
         states: Of the leaves that have begun, by their numbers.
     """
 
+    desk: "MissionDesk"
     mission: Mission
     given: Arguments
-    find_skill: Callable[[str], Skill]
-    facts: Facts
+    parts: Mapping[str, Mission]
     on_progress: OnProgress
-    on_step: Callable[[str], None]
     states: dict[int, SkillState] = field(default_factory=dict)
     is_over: bool = False
     _account: list[str] = field(default_factory=list)
@@ -57,6 +62,7 @@ class MissionRunner:
     _last: SkillOutcome = field(default_factory=failed)
 
     def __post_init__(self) -> None:
+        self._facts = self.desk.gate.facts
         self._values: dict[str, JsonValue] = dict(self.given)
 
     async def run(self) -> SkillOutcome:
@@ -119,16 +125,16 @@ class MissionRunner:
         return all(ended)
 
     async def _do_in_time(self, step: Step) -> bool:
-        return bool(await end_within(self.facts, step.limit, partial(self._do, step.steps[0])))
+        return bool(await end_within(self._facts, step.limit, partial(self._do, step.steps[0])))
 
     async def _do_every(self, step: Step) -> bool:
         """Do all rounds, a period from one beginning to the next; fail where none succeeded."""
         next_s, n_good = -math.inf, 0
         for _ in range(step.times):
-            now_s = self.facts.now_s
+            now_s = self._facts.now_s
             begin_s = max(now_s, next_s)
             next_s = begin_s + step.limit * 60
-            await self.facts.sleep(begin_s - now_s)
+            await self._facts.sleep(begin_s - now_s)
             n_good += await self._do(step.steps[0])
         done = f"{n_good} of {step.times} rounds did all their steps"
         self.note(f"{step.number} {step.kind}: {done}")
@@ -147,7 +153,7 @@ class MissionRunner:
         await checkpoint()
         self.states[step.number] = SkillState.RUNNING
         try:
-            skill = self.find_skill(step.skill)
+            skill = self.desk.find_part(step.skill, self.parts)
             given = fill_in(step.name_arguments(skill.spec), self._values)
             self._tell(now=f"{step.number} {step.skill}")
             outcome = await skill.run(given, partial(self._take_progress, step))
@@ -172,10 +178,10 @@ class MissionRunner:
 
     def note(self, said: str) -> None:
         """Tell and keep what was done, with the time by the operator's clock, else the robot's."""
-        at = self.facts.read_calendar()
-        time = f"{self.facts.now_s:.0f} s" if at is None else f"{at:%H:%M:%S}"
+        at = self._facts.read_calendar()
+        time = f"{self._facts.now_s:.0f} s" if at is None else f"{at:%H:%M:%S}"
         self._account.append(f"{time} {said}")
-        self.on_step(said)
+        self.desk.record.note(said)
         self._tell(now="")
 
     def _take_progress(self, step: Step, progress: SkillProgress) -> None:
@@ -197,3 +203,118 @@ def _say_end(step: Step, outcome: SkillOutcome) -> str:
     if outcome.quote:
         said += f' "{outcome.quote[:120]}"'
     return said[:MOST_LINE]
+
+
+@dataclass(eq=False)
+class MissionDesk:
+    """Checks and runs the missions of one server.
+
+    Attributes:
+        find_skill: Raises `SkillError` for a name that it does not know.
+        gate: Lets a mission begin, and ends it in time.
+        record: On disk.
+        present: Marks a client as present: a mission needs no client while it runs.
+        begins: Called as a mission begins.
+        latest: The latest mission; None before the first.
+    """
+
+    find_skill: FindSkill
+    gate: SkillGate
+    record: MissionRecord
+    present: Callable[[], AbstractContextManager[None]] = nullcontext
+    begins: Callable[[], None] = lambda: None
+    latest: MissionRunner | None = None
+
+    def check(self, mission: Mission) -> MissionBounds:
+        """Return what a mission can do at most.
+
+        Raises:
+            SkillError: A part of it is unknown, not allowed, or does not fit.
+        """
+        return MissionCheck(self.find_skill).find_bounds(mission)
+
+    def open(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
+        """Return the mission that is written in an entry.
+
+        Args:
+            path: The file that it is saved in.
+
+        Raises:
+            SkillError: Its tree has a mistake.
+        """
+
+        async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
+            return await self._run(mission, arguments, on_progress)
+
+        mission = Mission(entry.spec, run, entry.tree, tuple(entry.remember), path)
+        return mission
+
+    async def _run(
+        self, mission: Mission, arguments: Arguments, on_progress: OnProgress
+    ) -> SkillOutcome:
+        """Run a mission.
+
+        Raises:
+            ApprovalNeededError: A person has to agree to it first, once for all of it.
+            SkillError: It has a mistake, or another mission is under way.
+            PolicyError: It is not allowed.
+        """
+        spec = mission.spec
+        given = check_arguments(spec.parameters, arguments, skill=spec.name)
+        if self.latest is not None and not self.latest.is_over:
+            raise SkillError(
+                "Another mission is under way; there is one at a time.",
+                hint="Wait for its end, or cancel it.",
+            )
+        bounds = self.check(mission)
+        scope, guard = scope_of(mission, given, bounds), self.gate.guard
+        kinds = frozenset() if guard is None else guard.policy.approval.kinds
+        self.latest = runner = MissionRunner(self, mission, given, bounds.parts, on_progress)
+        self.begins()
+        try:
+            acting = replace(current_caller(), mission=spec.name)
+            with self.present(), within_scope(scope), calling(acting):
+                return await self.gate.run_once(
+                    spec,
+                    partial(self._run_recorded, runner),
+                    command=RunSkill(
+                        skill=spec.name,
+                        arguments=given,
+                        needs_word=needs_word(spec, bounds, kinds),
+                    ),
+                    is_covering=False,
+                )
+        finally:
+            runner.is_over = True
+            if guard is not None:
+                guard.end_scope(scope)
+
+    async def _run_recorded(self, runner: MissionRunner) -> SkillOutcome:
+        said = "cut off"
+        self.record.begin(runner.mission.spec.name)
+        try:
+            outcome = await runner.run()
+            said = str(outcome.state)
+        finally:
+            self.record.end(said)
+        return outcome
+
+    def find_part(self, name: str, parts: Mapping[str, Mission]) -> Skill:
+        """Return the skill of a leaf; a mission is approved and recorded with the one around it.
+
+        Args:
+            parts: The missions within, as they were when that one was approved.
+
+        Raises:
+            SkillError: There is none of that name now.
+        """
+        if (part := parts.get(name)) is None:
+            return self.find_skill(name)
+        spec = part.spec
+
+        async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
+            given = check_arguments(spec.parameters, arguments, skill=name)
+            runner = MissionRunner(self, part, given, parts, on_progress)
+            return await self.gate.run_once(spec, runner.run, command=None)
+
+        return Skill(spec, run)

@@ -17,7 +17,7 @@ from mapspeak.skill import (
     SkillState,
 )
 from mapspeak.skills.arguments import say_wanted
-from mapspeak.skills.mission import MissionBounds
+from mapspeak.skills.bounds import MissionBounds
 from mapspeak.skills.missionrecord import Interrupted
 from mapspeak.skills.runs import Question, QuestionBook, SkillRun
 from mapspeak.skills.steps import Mission, Step, StepKind

@@ -16,8 +16,8 @@ from mapspeak.server.tools.skills.leaves import Leaves, SessionFacts
 from mapspeak.session import Session
 from mapspeak.skill import Skill, SkillEffect
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.mission import MissionDesk
 from mapspeak.skills.missionrecord import MissionRecord
+from mapspeak.skills.missionrunner import MissionDesk
 from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
 from mapspeak.skills.steps import CONTROL, Mission

@@ -26,7 +26,7 @@ from mapspeak.server.tools.skills.calling import tell_news
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
-from mapspeak.skills.mission import MissionBounds
+from mapspeak.skills.bounds import MissionBounds
 from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
     NAME,
