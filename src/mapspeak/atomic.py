@@ -1,7 +1,11 @@
-"""Files that are replaced as a whole: a full disk or a crash leaves the old one or the new one."""
+"""Files that are replaced as a whole, and logs: a full disk or a crash leaves no half of one.
+
+Of a log it leaves at most half a line, the last one.
+"""
 
 import contextlib
 import errno
+import fcntl
 import os
 import stat
 import sys
@@ -58,6 +62,34 @@ def _take_after(status: os.stat_result, new: Path) -> None:
         with contextlib.suppress(PermissionError):
             os.chown(new, status.st_uid, status.st_gid)
     new.chmod(stat.S_IMODE(status.st_mode))
+
+
+def append_line(path: Path, line: bytes, *, most_bytes: int) -> None:
+    """Append a line to a log, opened anew, so that a file that was moved is noticed.
+
+    Half a line that a crash has left is ended first; a missing folder is made.
+
+    Args:
+        most_bytes: A file that has grown larger is renamed to "NAME.1", in place of the one before.
+
+    Raises:
+        OSError: It cannot be written, or not as a whole.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o600)
+    try:
+        if os.pread(descriptor, 1, max(os.fstat(descriptor).st_size - 1, 0)) not in (b"\n", b""):
+            line = b"\n" + line
+        if os.write(descriptor, line + b"\n") != len(line) + 1:
+            raise OSError(errno.ENOSPC, "there is no room")
+        if os.fstat(descriptor).st_size > most_bytes:
+            # Of several servers one renames the file; the others find that it is another by then.
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), path.stat()):
+                    path.replace(f"{path}.1")
+    finally:
+        os.close(descriptor)
 
 
 def sync_folder(folder: Path) -> None:

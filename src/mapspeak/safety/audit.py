@@ -1,19 +1,19 @@
 """The audit log: append-only JSON lines for each decision and result, with the caller."""
 
-import fcntl
 import itertools
 import json
 import math
 import os
 import secrets
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from mapspeak.atomic import append_line
 from mapspeak.errors import ConfigError, PolicyError, say_cause
 from mapspeak.safety.commands import Command, DriveCommand, say_command
 
@@ -60,8 +60,8 @@ def calling(caller: Caller) -> Generator[None]:
         _CALLER.reset(token)
 
 
-BEGIN, ENDS = '{"number": ', (b"\n", b"")
-"""How each line begins, and what lies before one: the end of another, or nothing."""
+BEGIN = '{"number": '
+"""How each line begins."""
 MOST_CHARACTERS = 2_000
 """The most characters kept of one argument; a cut is marked."""
 
@@ -158,34 +158,11 @@ class AuditLog:
             "details": {} if command is None else _details(command),
         }
         text = json.dumps(line, ensure_ascii=False, default=lambda value: str(value)[:200])
-        self._append(f"{text}\n".encode(errors="replace"))
-        self.tell(line)
-
-    def _append(self, line: bytes) -> None:
-        """Write a whole line or raise: opened anew, so that a file that was moved is noticed."""
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o600)
-            try:
-                if os.pread(descriptor, 1, max(os.fstat(descriptor).st_size - 1, 0)) not in ENDS:
-                    line = b"\n" + line
-                n_written = os.write(descriptor, line)
-                self._begin_anew_if_large(descriptor)
-            finally:
-                os.close(descriptor)
+            append_line(self.path, text.encode(errors="replace"), most_bytes=self._most_bytes)
         except OSError as error:
             raise self._broken(error.strerror or str(error)) from error
-        if n_written != len(line):
-            raise self._broken("there is no room")
-
-    def _begin_anew_if_large(self, descriptor: int) -> None:
-        if os.fstat(descriptor).st_size <= self._most_bytes:
-            return
-        # Of several servers one renames the file; the others find that it is another one by then.
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), self.path.stat()):
-                self.path.replace(f"{self.path}.1")
+        self.tell(line)
 
     def _broken(self, reason: str) -> PolicyError:
         return PolicyError(

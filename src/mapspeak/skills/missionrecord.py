@@ -11,12 +11,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from mapspeak.atomic import append_line
 from mapspeak.hold import is_running
 
 logger = logging.getLogger(__name__)
 
 MOST_BYTES = 5_000_000
-"""A file that has grown larger is renamed to "NAME.1", in place of the one before."""
 MOST_TOLD = 5
 
 
@@ -39,7 +39,6 @@ class MissionRecord:
     """Writes one file, and finds in it the missions that an earlier server left unfinished.
 
     Attributes:
-        path: The file.
         wall_clock: The operator's; without one no times are written.
     """
 
@@ -51,15 +50,22 @@ class MissionRecord:
     def begin(self, name: str) -> None:
         """Note that a mission begins; the following steps are its own."""
         self._run = secrets.token_hex(4)
-        self._write("begun", name)
+        self.note(name, event="begun")
 
-    def note(self, said: str) -> None:
-        """Note a step."""
-        self._write("step", said)
-
-    def end(self, said: str) -> None:
-        """Note how the mission has ended."""
-        self._write("ended", said)
+    def note(self, said: str, *, event: str = "step") -> None:
+        """Note a step, or how the mission has "ended"; no fault of the disk ends a mission."""
+        at = self.wall_clock()
+        line = {
+            "at": None if at is None else at.isoformat(timespec="seconds"),
+            "run": self._run,
+            "process": os.getpid(),
+            "event": event,
+            "said": said,
+        }
+        try:
+            append_line(self.path, json.dumps(line).encode(), most_bytes=MOST_BYTES)
+        except OSError as error:
+            logger.warning("What missions do could not be noted: %s", error.strerror)
 
     def take_interrupted(self) -> tuple[Interrupted, ...]:
         """Return the missions that no server will end any more, once: they are noted as ended."""
@@ -74,13 +80,9 @@ class MissionRecord:
                 found[run].steps += (said,)
             elif event == "ended":
                 found.pop(run, None)
-        if found:
-            # The last line of a server that was killed may be half a line.
-            with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
-                file.write("\n")
         for run in found:
             self._run = run
-            self.end("interrupted: its server ended")
+            self.note("interrupted: its server ended", event="ended")
         return tuple(found.values())[-MOST_TOLD:]
 
     def _read(self) -> Iterator[dict[str, Any]]:
@@ -91,22 +93,3 @@ class MissionRecord:
             with suppress(ValueError):
                 if isinstance(read := json.loads(line), dict):
                     yield read
-
-    def _write(self, event: str, said: str) -> None:
-        """Append a line; that it cannot be is told, and ends no mission."""
-        at = self.wall_clock()
-        line = {
-            "at": None if at is None else at.isoformat(timespec="seconds"),
-            "run": self._run,
-            "process": os.getpid(),
-            "event": event,
-            "said": said,
-        }
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            if self.path.exists() and self.path.stat().st_size > MOST_BYTES:
-                self.path.replace(self.path.with_name(f"{self.path.name}.1"))
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(line) + "\n")
-        except OSError as error:
-            logger.warning("What missions do could not be noted: %s", error.strerror)

@@ -296,7 +296,7 @@ class MissionDesk:
             outcome = await runner.run()
             said = str(outcome.state)
         finally:
-            self.record.end(said)
+            self.record.note(said, event="ended")
         return outcome
 
     def find_part(self, name: str, parts: Mapping[str, Mission]) -> Skill:
