@@ -124,11 +124,7 @@ class MissionCheck:
 
 
 def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
-    """Check arguments as far as they are known before the mission runs.
-
-    Raises:
-        SkillError: They do not fit.
-    """
+    """Check arguments as far as they are known before the mission runs."""
     later = {each.name for each in spec.parameters if find_names(given.get(each.name))}
     known = [each for each in spec.parameters if each.name not in later]
     now = {name: value for name, value in given.items() if name not in later}

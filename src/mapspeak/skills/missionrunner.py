@@ -43,9 +43,7 @@ class MissionRunner:
     Attributes:
         desk: Finds the skill of a leaf when that begins: it may have gone meanwhile.
         mission: With a tree that was checked before.
-        given: Its arguments.
         parts: The missions within it, as they were when it was approved.
-        on_progress: Told of each step.
         states: Of the leaves that have begun, by their numbers.
     """
 
@@ -252,13 +250,7 @@ class MissionDesk:
     async def _run(
         self, mission: Mission, arguments: Arguments, on_progress: OnProgress
     ) -> SkillOutcome:
-        """Run a mission.
-
-        Raises:
-            ApprovalNeededError: A person has to agree to it first, once for all of it.
-            SkillError: It has a mistake, or another mission is under way.
-            PolicyError: It is not allowed.
-        """
+        """Run a mission, for which a person is asked once, unless another one is under way."""
         spec = mission.spec
         given = check_arguments(spec.parameters, arguments, skill=spec.name)
         if self.latest is not None and not self.latest.is_over:

@@ -1,7 +1,8 @@
 """skills.yaml, in which the owner declares a robot's skills; saved missions are such files too."""
 
 import io
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from enum import StrEnum
 from functools import cached_property
@@ -274,10 +275,8 @@ def add_correction(path: Path, name: str, correction: str) -> None:
     Raises:
         ConfigError: The file cannot be read or written.
     """
-    try:
+    with _changing(path):
         tree = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
-    except (OSError, YAMLError) as error:
-        raise ConfigError(f"{path} cannot be read: {error}.", hint="Check the file.") from error
     for each in tree["skills"]:
         if each["name"] == name:
             each.setdefault("remember", []).append(correction)
@@ -292,10 +291,8 @@ def write_skills(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
     """
     text = io.StringIO()
     YAML(typ="rt").dump(tree, text)
-    try:
+    with _changing(path):
         replace_file(path, text.getvalue().encode())
-    except OSError as error:
-        raise _not_written(path, error) from error
 
 
 def set_aside(path: Path) -> Path:
@@ -304,13 +301,15 @@ def set_aside(path: Path) -> Path:
     Raises:
         ConfigError: The file cannot be renamed.
     """
-    try:
+    with _changing(path):
         return path.replace(path.with_name(f"{path.name}.forgotten"))
-    except OSError as error:
-        raise _not_written(path, error) from error
 
 
-def _not_written(path: Path, error: OSError) -> ConfigError:
-    return ConfigError(
-        f"{path} could not be written: {say_cause(error)}.", hint="Check disk and permissions."
-    )
+@contextmanager
+def _changing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, YAMLError) as error:
+        raise ConfigError(
+            f"{path} could not be written: {say_cause(error)}.", hint="Check disk and permissions."
+        ) from error

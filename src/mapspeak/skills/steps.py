@@ -221,11 +221,7 @@ def _leaf(written: Mapping[str, Any], number: int) -> Step:
 
 
 def _plain(value: object) -> JsonValue:
-    """Return a value of YAML without what its reader adds.
-
-    Raises:
-        SkillError: It holds itself, or is nested too deep.
-    """
+    """Return a value of YAML without what its reader adds."""
     try:
         return json.loads(json.dumps(value, default=str))
     except (ValueError, RecursionError) as error:

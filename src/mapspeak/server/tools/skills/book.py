@@ -29,14 +29,9 @@ class SkillBook:
     """Knows every skill, keeps saved missions as files, and tells which skills are tools.
 
     Args:
-        session: Whose robot it is.
-        ros: The way to its interfaces.
         entries: Of the owner's skills.yaml.
 
     Attributes:
-        session: The same.
-        runs: Runs the skills.
-        desk: Runs missions.
         folder: Where missions are saved.
         saved: The missions that were saved, by name.
         exposed: The interfaces of the robot that are tools now, by the names of these.

@@ -43,8 +43,6 @@ class Exposure:
     """Keeps the exposed skills of a book in step with the robot's interfaces of some names.
 
     Attributes:
-        ros: The way to the robot.
-        book: Of all skills.
         patterns: Of full names, as the shell writes them: "/gripper/*".
         tell: Tells clients where tools have changed.
         every_s: Between two looks.
@@ -119,11 +117,7 @@ class Exposure:
             return anyio.current_time()
 
     def _check_policy(self, interface: Interface) -> None:
-        """Check that the policy does not deny an interface for its name.
-
-        Raises:
-            PolicyError: It does: a tool that is always refused is not offered.
-        """
+        """Refuse an interface that the policy denies for its name: a tool would be of no use."""
         connection, command = self.ros.inquiry.connection, interface.command
         if command is None or not isinstance(connection, GuardedConnection):
             return

@@ -155,13 +155,7 @@ class _Opened:
         return replace(succeeded(**outputs), numbers={"age_s": age_s})
 
     async def _check(self, arguments: Arguments) -> Message:
-        """Return the message that the arguments are, as its type wants it.
-
-        Raises:
-            LinkError: It does not fit, or names an unknown frame.
-            PolicyError: The interface is denied.
-            SkillError: An argument is unknown, or has a wrong value.
-        """
+        """Return the message that the arguments are; refuse one that is denied or does not fit."""
         if (command := self.interface.command) is not None:
             self.ros.inquiry.check_policy(command)
         given = check_arguments(self.spec.parameters, arguments, skill=self.spec.name)

@@ -60,12 +60,7 @@ ENDS = {
 
 @dataclass(eq=False)
 class SessionFacts:
-    """Facts of one session.
-
-    Attributes:
-        session: The session to ask.
-        ros: The ROS system that may publish a battery.
-    """
+    """The facts of one session; its ROS system may publish a battery."""
 
     session: Session
     ros: RosAccess
@@ -241,13 +236,7 @@ BUILT_IN = frozenset(each.name for each in (DRIVE, LOOK, NOTE, CHECK, WAIT_FOR, 
 
 @dataclass(frozen=True, slots=True)
 class Leaves:
-    """Does what missions do with the robot itself.
-
-    Attributes:
-        session: Whose robot it is.
-        facts: Of that session.
-        questions: Where its questions wait.
-    """
+    """Does what missions do with the robot itself."""
 
     session: Session
     facts: Facts

@@ -196,11 +196,7 @@ class MissionTools:
         return f"{name} is forgotten; its file is kept as {path}."
 
     async def _check(self, mission: Mission, given: Arguments) -> MissionBounds:
-        """Return what a mission can do at most; refuse places that are not there.
-
-        Raises:
-            SkillError: It has a mistake.
-        """
+        """Return what a mission can do at most; refuse places that are not there."""
         bounds, session = self._book.desk.check(mission), self._book.session
         with suppress(LinkError, MapError):
             world = await session.fetch_world_model()
@@ -226,11 +222,7 @@ class MissionTools:
                         raise SkillError(said, hint=error.hint) from error
 
     def _check_file(self, path: Path, name: str) -> None:
-        """Check that a file is all of one mission, and a mission in no other file.
-
-        Raises:
-            SkillError: It is not: the file is its writer's to change.
-        """
+        """Refuse a file of several missions, or a mission of another file: these are a person's."""
         for each in self._book.saved.values():
             if (each.path == path) != (each.spec.name == name):
                 said = f"{each.spec.name} stands in {each.path}, which a person has written."
