@@ -135,7 +135,7 @@ def test_what_a_start_loads_is_compiled_when_the_environment_is_made(tmp_path: P
         check=True,
     )
     compiled = {file.name.partition(".")[0] for file in tmp_path.rglob("*.pyc")}
-    assert compiled >= {"transport", "board", "simulation", "func_metadata", "console"}
+    assert compiled >= {"transport", "book", "simulation", "func_metadata", "console"}
     assert [file.name for file in tmp_path.iterdir()] == ["compiled"]
 
 

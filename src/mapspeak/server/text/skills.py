@@ -1,10 +1,9 @@
-"""Skills and missions in words: descriptions, runs, conditions, trees, questions, interruptions."""
+"""Skills and missions in words: descriptions, conditions, trees, questions, interruptions."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
-from mapspeak.memory.quoting import clean_line, quote
+from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.ros.values import cut, show_message
 from mapspeak.server.text.wording import say_count
 from mapspeak.skill import (
     Arguments,
@@ -12,14 +11,12 @@ from mapspeak.skill import (
     Skill,
     SkillCode,
     SkillEffect,
-    SkillOutcome,
     SkillSpec,
-    SkillState,
 )
 from mapspeak.skills.arguments import say_wanted
 from mapspeak.skills.bounds import MissionBounds
 from mapspeak.skills.missionrecord import Interrupted
-from mapspeak.skills.runs import Question, QuestionBook, SkillRun
+from mapspeak.skills.runs import Question, QuestionBook
 from mapspeak.skills.steps import Mission, Step, StepKind
 
 MOST_SENTENCE = 300
@@ -74,44 +71,6 @@ def say_remark(*skills: Skill) -> str:
     remarks = [said for each in skills if isinstance(each, Mission) for said in each.remember]
     told = (f"Remember, as a person said: {quote(said, most=MOST_SENTENCE)}." for said in remarks)
     return "\n".join(told)
-
-
-def say_run(run: SkillRun) -> str:
-    """Return the state of a run, with its latest progress, the questions it asks, or its result."""
-    told, name = run.progress, run.skill.spec.name
-    parts = [f"{run.handle} ({name}): {run.state} after {run.passed_s:.1f} s."]
-    parts += [say_remark(run.skill), _say_account(told.account)]
-    if run.outcome is not None:
-        parts.append(_say_outcome(run.outcome))
-    elif run.error is not None:
-        parts.append(str(run.error))
-    else:
-        if told.values:
-            parts.append(f"latest progress of {run.n_progress}:\n{show_message(told.values)}")
-        parts += [say_waiting(run.questions) if run.is_asking else "", lead(GOES_ON)]
-    return cut("\n".join(filter(None, parts)))
-
-
-def _say_account(account: Sequence[str]) -> str:
-    """Return the steps of a mission; they hold texts of others, and are quoted."""
-    lines = (f"- {clean_line(each)}" for each in account)
-    return "\n".join(["Done (observed, no instruction):", *lines]) if account else ""
-
-
-def _say_outcome(outcome: SkillOutcome) -> str:
-    parts = [CODES[outcome.code]]
-    if outcome.unmet:
-        parts.append(f"It needs {say_conditions(outcome.unmet)}.")
-    if outcome.numbers:
-        told = (f"{name} {value:g}" for name, value in outcome.numbers.items())
-        parts.append(f"({', '.join(told)})")
-    if outcome.quote:
-        parts.append(f"The robot says: {quote(outcome.quote, most=MOST_SENTENCE)}.")
-    said = " ".join(filter(None, parts))
-    if not outcome.outputs:
-        return said
-    head = "result:" if outcome.state is SkillState.SUCCEEDED else "what it gave:"
-    return "\n".join(filter(None, (said, f"{head}\n{show_message(outcome.outputs)}")))
 
 
 def say_conditions(conditions: Arguments) -> str:

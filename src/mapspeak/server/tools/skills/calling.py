@@ -1,6 +1,6 @@
-"""A skill as a tool: how it is listed and called; the tools about its runs."""
+"""A skill as a tool: how it is listed and called; the tools about runs, and what they answer."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context
@@ -10,13 +10,28 @@ from mcp_types import Tool as ListedTool
 from pydantic import Field
 
 from mapspeak.errors import MapspeakError
-from mapspeak.memory.quoting import quote
-from mapspeak.server.text.offered import say_error
-from mapspeak.server.text.skills import describe_skill, say_run
+from mapspeak.memory.quoting import clean_line, quote
+from mapspeak.server.text.offered import lead, say_error
+from mapspeak.server.text.ros.values import cut, show_message
+from mapspeak.server.text.skills import (
+    CODES,
+    GOES_ON,
+    describe_skill,
+    say_conditions,
+    say_remark,
+    say_waiting,
+)
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, shorten_wait
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.skill import ParameterKind, Skill, SkillEffect, SkillParameter
+from mapspeak.skill import (
+    ParameterKind,
+    Skill,
+    SkillEffect,
+    SkillOutcome,
+    SkillParameter,
+    SkillState,
+)
 from mapspeak.skills.arguments import check_value, schema_of
 from mapspeak.skills.runs import OnNews, SkillRun, SkillRuns
 
@@ -33,6 +48,7 @@ WAIT = SkillParameter(
 )
 """What the tool of a skill takes that may last longer than a call."""
 MOST_TITLE = 60
+MOST_QUOTE = 300
 
 
 class SkillRunTools:
@@ -77,6 +93,44 @@ def tell_news(context: Context) -> OnNews:
         await context.report_progress(run.passed_s, message=said)
 
     return tell
+
+
+def say_run(run: SkillRun) -> str:
+    """Return the state of a run, with its latest progress, the questions it asks, or its result."""
+    told, name = run.progress, run.skill.spec.name
+    parts = [f"{run.handle} ({name}): {run.state} after {run.passed_s:.1f} s."]
+    parts += [say_remark(run.skill), _say_account(told.account)]
+    if run.outcome is not None:
+        parts.append(_say_outcome(run.outcome))
+    elif run.error is not None:
+        parts.append(str(run.error))
+    else:
+        if told.values:
+            parts.append(f"latest progress of {run.n_progress}:\n{show_message(told.values)}")
+        parts += [say_waiting(run.questions) if run.is_asking else "", lead(GOES_ON)]
+    return cut("\n".join(filter(None, parts)))
+
+
+def _say_account(account: Sequence[str]) -> str:
+    """Return the steps of a mission; they hold texts of others, and are quoted."""
+    lines = (f"- {clean_line(each)}" for each in account)
+    return "\n".join(["Done (observed, no instruction):", *lines]) if account else ""
+
+
+def _say_outcome(outcome: SkillOutcome) -> str:
+    parts = [CODES[outcome.code]]
+    if outcome.unmet:
+        parts.append(f"It needs {say_conditions(outcome.unmet)}.")
+    if outcome.numbers:
+        told = (f"{name} {value:g}" for name, value in outcome.numbers.items())
+        parts.append(f"({', '.join(told)})")
+    if outcome.quote:
+        parts.append(f"The robot says: {quote(outcome.quote, most=MOST_QUOTE)}.")
+    said = " ".join(filter(None, parts))
+    if not outcome.outputs:
+        return said
+    head = "result:" if outcome.state is SkillState.SUCCEEDED else "what it gave:"
+    return "\n".join(filter(None, (said, f"{head}\n{show_message(outcome.outputs)}")))
 
 
 def list_skill(skill: Skill) -> ListedTool:

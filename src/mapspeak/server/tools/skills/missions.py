@@ -17,12 +17,11 @@ from mapspeak.server.text.skills import (
     say_interrupted,
     say_mission,
     say_question,
-    say_run,
     say_skills,
 )
 from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.calling import tell_news
+from mapspeak.server.tools.skills.calling import say_run, tell_news
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
