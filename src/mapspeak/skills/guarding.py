@@ -196,24 +196,19 @@ class SkillGate:
         facts, guard = self.facts, self.guard
         if spec.needs and (unmet := await find_unmet(spec.needs, facts)):
             return SkillOutcome(SkillState.FAILED, SkillCode.PRECONDITION, unmet=unmet)
+        late = SkillOutcome(
+            SkillState.TIMED_OUT, SkillCode.TOO_LATE, numbers={"after_s": spec.timeout_s}
+        )
         if guard is None or command is None:
-            return await _end_in_time(spec, work, facts)
+            return await end_within(facts, spec.timeout_s, work) or late
         permit, said = guard.clear(command, robot_s=facts.now_s), "given up"
         try:
             with covered_by(permit.by) if is_covering else nullcontext():
-                outcome = await _end_in_time(spec, work, facts)
+                outcome = await end_within(facts, spec.timeout_s, work) or late
             said = outcome.state
             return outcome
         finally:
             guard.note_result(permit, said, robot_s=facts.now_s)
-
-
-async def _end_in_time(
-    spec: SkillSpec, work: Callable[[], Awaitable[SkillOutcome]], facts: Facts
-) -> SkillOutcome:
-    return await end_within(facts, spec.timeout_s, work) or SkillOutcome(
-        SkillState.TIMED_OUT, SkillCode.TOO_LATE, numbers={"after_s": spec.timeout_s}
-    )
 
 
 async def end_within(facts: Facts, limit_s: float, work: Callable[[], Awaitable[T]]) -> T | None:

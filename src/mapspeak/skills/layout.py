@@ -1,7 +1,6 @@
 """A ROS message type as flat parameters, and messages built of arguments and read back."""
 
 import base64
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -13,13 +12,12 @@ from mapspeak.errors import LinkError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.ros.definitions.types import (
     FLOATS,
-    MOST_NESTED,
     TEXTS,
     TIMES,
     WHOLES,
     Field,
-    MessageType,
     TypeBook,
+    look_up,
 )
 from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.skill import JsonValue, ParameterKind, SkillParameter
@@ -34,7 +32,6 @@ MOST_IN_LIST = 32
 """Of bytes; longer ones are given as one text in base64."""
 MOST_TEXT = 100_000
 MOST_REMARK = 100
-REMARK = re.compile(r"\s*\S+\s+(?P<name>\w+)\b[^#\n]*#+\s*(?P<said>.+)")
 
 UNITS = {
     "geometry_msgs/Point": dict.fromkeys("xyz", "m"),
@@ -149,7 +146,6 @@ class _Builder:
 
     def __init__(self, book: TypeBook) -> None:
         self._book = book
-        self._remarks: dict[str, Mapping[str, str]] = {}
         self._n_described = 0
 
     def leaves(
@@ -172,7 +168,7 @@ class _Builder:
                 f"A type with {way[-1]} within has more than {MOST_DESCRIBED} fields.",
                 hint="No model could fill it in: leave it out.",
             )
-        unit, remark = _unit(way, field, unit), self._remark(self._book[way[-1]], field)
+        unit, remark = _unit(way, field, unit), self._remark(way, field)
         if field.length is None:
             return replace(self._one(way, field, unit), name=field.name, description=remark)
         longest = field.length or field.most or MOST_LISTED
@@ -205,32 +201,16 @@ class _Builder:
 
     def _enter(self, way: tuple[str, ...], field: Field) -> tuple[str, ...]:
         """Return the way into a field that is a message."""
-        if field.type in way or len(way) > MOST_NESTED:
-            raise LinkError(
-                f"The type {way[0]} holds itself, in {way[-1]}.{field.name}.",
-                hint="No message can be of such a type: correct its definition.",
-            )
-        if field.is_message and not self._book.knows(field.type):
-            raise LinkError(
-                f"The type {field.type} of {way[-1]}.{field.name} is not described.",
-                hint="Install it where mapspeak runs, or ask a robot that tells its types.",
-            )
+        look_up(self._book, field.type, above=way)
         return (*way, field.type)
 
-    def _remark(self, message: MessageType, field: Field) -> str:
+    def _remark(self, way: tuple[str, ...], field: Field) -> str:
         """Return the definition's comment on a field; else the constants, of an only number."""
-        if message.name not in self._remarks:
-            lines = self._book.texts.get(message.name, "").splitlines()
-            found = filter(None, map(REMARK.match, lines))
-            self._remarks[message.name] = {
-                each["name"]: clean_line(each["said"])[:MOST_REMARK] for each in found
-            }
-        said = self._remarks[message.name].get(field.name, "")
+        message, said = self._book[way[-1]], field.remark
         wholes = [each for each in message.fields if each.type in WHOLES]
         if not said and message.constants and wholes == [field]:
-            named = ", ".join(f"{name}={value}" for name, value in message.constants.items())
-            return clean_line(named)[:MOST_REMARK]
-        return said
+            said = ", ".join(f"{name}={value}" for name, value in message.constants.items())
+        return clean_line(said)[:MOST_REMARK]
 
 
 def _is_message(field: Field) -> bool:

@@ -256,14 +256,7 @@ def _shown(value: object) -> str:
 
 def find_names(value: JsonValue) -> set[str]:
     """Return the names that texts within a value want filled in."""
-    match value:
-        case str():
-            return {match[1] for match in TEMPLATE.finditer(value)}
-        case Mapping():
-            return find_names(list(value.values()))
-        case list() | tuple():
-            return {name for each in value for name in find_names(each)}
-    return set()
+    return {match[1] for match in TEMPLATE.finditer(json.dumps(value, default=str))}
 
 
 def fill_in(value: JsonValue, values: Arguments) -> JsonValue:

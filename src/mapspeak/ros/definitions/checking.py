@@ -15,7 +15,6 @@ from mapspeak.ros.definitions.types import (
     FLOATS,
     MOST_NESTED,
     TEXTS,
-    TIMES,
     WHOLES,
     Field,
     MessageType,
@@ -89,7 +88,7 @@ def check_message(book: TypeBook, type_name: str, message: object) -> dict[str, 
 
 
 def _check(book: TypeBook, type_name: str, message: object, *, path: str) -> dict[str, Any]:
-    if type_name not in TIMES and not book.knows(type_name):
+    if not book.knows(type_name):
         raise LinkError(
             f"{path or 'The message'} is a {type_name}, which nobody has described.",
             hint="Give its definition first.",

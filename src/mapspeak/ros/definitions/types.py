@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,7 @@ class Field:
         most: The largest length of a list; None without a bound.
         most_letters: The largest length of a text; None without a bound.
         default: Its default, as written in the definition.
+        remark: The definition's comment on it.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Field:
     most: int | None = None
     most_letters: int | None = None
     default: str = ""
+    remark: str = field(default="", compare=False)
 
     @property
     def is_message(self) -> bool:
@@ -127,13 +129,15 @@ def _field(found: re.Match[str], package: str) -> Field:
     length = None
     if found["list"]:
         length = int(found["length"] or 0)
+    default, _, remark = found["rest"].partition("#")
     return Field(
         name=found["name"],
         type=_full_type(found["type"], package),
         length=length,
         most=int(found["most"]) if found["most"] else None,
         most_letters=int(found["most_letters"]) if found["most_letters"] else None,
-        default=found["rest"].partition("#")[0].strip(),
+        default=default.strip(),
+        remark=remark.strip("# "),
     )
 
 
@@ -158,7 +162,7 @@ class TypeBook:
 
     def knows(self, name: str) -> bool:
         """Return True for a type that is described here, however its name is written."""
-        return bare_type(name) in self.texts
+        return name in TIMES or bare_type(name) in self.texts
 
     def __getitem__(self, name: str) -> MessageType:
         """Return a type that is known; the times of ROS 1 are types of two numbers."""
@@ -316,12 +320,17 @@ def look_up(book: TypeBook, name: str, *, above: tuple[str, ...]) -> MessageType
     """Return a type that is within others.
 
     Raises:
-        LinkError: It is not known, or holds itself.
+        LinkError: It is not described, or holds itself.
     """
     bare = bare_type(name)
-    if not book.knows(name) or bare in above or len(above) > MOST_NESTED:
+    if bare in above or len(above) > MOST_NESTED:
         raise LinkError(
-            f"We do not know what a {bare[:80]} looks like.",
+            f"The type {above[0][:80]} holds itself, in {above[-1][:80]}.",
+            hint="No message can be of such a type: correct its definition.",
+        )
+    if not book.knows(name):
+        raise LinkError(
+            f"The type {bare[:80]} is not described.",
             hint="Robots of ROS 2 Jazzy and later tell it for topics; for others take rosbridge, "
             "or give its definition where a tool asks for one.",
         )
