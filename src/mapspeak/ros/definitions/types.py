@@ -1,8 +1,9 @@
 """Message types as values, read from .msg texts; books of them, and how large messages are."""
 
+import dataclasses
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ class Field:
     most: int | None = None
     most_letters: int | None = None
     default: str = ""
-    remark: str = field(default="", compare=False)
+    remark: str = dataclasses.field(default="", compare=False)
 
     @property
     def is_message(self) -> bool:
