@@ -35,6 +35,8 @@ RESERVED = frozenset({"wait_s", "for_s", "robot"})
 """Names that no argument of a tool may have: they are the tool's own."""
 PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
 
+_Name = tuple[Called, str]
+
 logger = logging.getLogger(__name__)
 
 
@@ -46,7 +48,7 @@ class Exposure:
         patterns: Of full names, as the shell writes them: "/gripper/*".
         tell: Tells clients where tools have changed.
         every_s: Between two looks.
-        kept_s: For which an answer is kept, and one that could not be opened is left out.
+        kept_s: For which an answer is kept.
     """
 
     ros: RosAccess
@@ -56,8 +58,7 @@ class Exposure:
     tell: Callable[[], Awaitable[None]]
     every_s: float = EVERY_S
     kept_s: float = KEPT_S
-    _tried: dict[Interface, Skill | float] = field(default_factory=dict)
-    _answers: dict[tuple[Called, str], tuple[list[Interface], float]] = field(default_factory=dict)
+    _known: dict[_Name, tuple[dict[Interface, Skill | None], float]] = field(default_factory=dict)
 
     async def keep_looking(self) -> None:
         """Look again and again; a robot out of reach keeps its tools until it is back.
@@ -73,13 +74,7 @@ class Exposure:
 
     def forget(self) -> None:
         """Ask for everything anew with the next look: the robot may be another one."""
-        self._answers.clear()
-        opened = self._tried.items()
-        self._tried = {each: found for each, found in opened if isinstance(found, Skill)}
-
-    @property
-    def _skills(self) -> list[Skill]:
-        return [found for found in self._tried.values() if isinstance(found, Skill)]
+        self._known = {key: (opened, -math.inf) for key, (opened, _) in self._known.items()}
 
     async def look(self) -> None:
         """Expose new interfaces, withdraw those that are gone, and tell clients of any change.
@@ -87,34 +82,47 @@ class Exposure:
         Raises:
             LinkError: The robot cannot be asked.
         """
-        found = await self._find()
-        before = self._tried
-        self._tried = {each: before[each] for each in found if each in before}
+        named = await self._list_named()
+        self._known = {key: each for key, each in self._known.items() if key in named}
         self._show()
-        for interface in found:
-            tried = self._tried.get(interface, -math.inf)
-            if isinstance(tried, float) and anyio.current_time() >= tried + self.kept_s:
-                self._tried[interface] = await self._open(interface)
-                self._show()
+        for key, type_name in named.items():
+            await self._ask(key, type_name)
+        self._show()
         await self.tell()
 
     def _show(self) -> None:
-        self.book.exposed = {each.spec.name: each for each in self._skills}
+        opened = (each for known, _ in self._known.values() for each in known.values())
+        self.book.exposed = {each.spec.name: each for each in opened if each is not None}
 
-    async def _open(self, interface: Interface) -> Skill | float:
-        """Return an interface as a skill; where it cannot be, when that was, and tell it once."""
+    async def _ask(self, key: _Name, type_name: str) -> None:
+        """Open what a name is, unless that was asked a moment ago; at an error all stays."""
+        known, asked_s = self._known.setdefault(key, ({}, -math.inf))
+        if anyio.current_time() < asked_s + self.kept_s:
+            return
+        with suppress(LinkError):
+            found = await self._fetch(*key, type_name)
+            for gone in known.keys() - found:
+                del known[gone]
+            for interface in found:
+                known[interface] = known.get(interface) or await self._open(interface, known)
+        self._known[key] = (known, anyio.current_time())
+
+    async def _open(self, interface: Interface, known: Collection[Interface]) -> Skill | None:
+        """Return an interface as a skill; None where it cannot be, which is told once."""
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
         name = _name_tool(base, taken=self.book.taken_names)
         try:
-            if len(self._skills) >= MOST_EXPOSED:
+            if len(self.book.exposed) >= MOST_EXPOSED:
                 said = f"{MOST_EXPOSED} tools are exposed already."
                 raise LinkError(said, hint="Name fewer of them.")
             self._check_policy(interface)
-            return await open_interface(interface, self.ros, name=name, reserved=RESERVED)
+            skill = await open_interface(interface, self.ros, name=name, reserved=RESERVED)
         except MapspeakError as error:
-            if interface not in self._tried:
+            if interface not in known:
                 logger.warning("%s is not exposed: %s", interface.name, error)
-            return anyio.current_time()
+            return None
+        self.book.exposed[name] = skill
+        return skill
 
     def _check_policy(self, interface: Interface) -> None:
         """Refuse an interface that the policy denies for its name: a tool would be of no use."""
@@ -124,8 +132,8 @@ class Exposure:
         if connection.is_name_denied(command):
             raise PolicyError("The policy denies it.", hint="A person can allow it in policy.yaml.")
 
-    async def _find(self) -> list[Interface]:
-        """Return the requested interfaces that the robot offers now."""
+    async def _list_named(self) -> dict[_Name, str]:
+        """Return what the robot offers now of the requested names, with the types of topics."""
         connection = self.ros.inquiry.connection
         graph = await connection.fetch_graph()
         services = [
@@ -138,23 +146,11 @@ class Exposure:
             **{(Called.SERVICE, name): "" for name in services},
             **{(Called.READ, name): kind for name, kind in _topics(graph)},
         }
-        self._answers = {key: each for key, each in self._answers.items() if key in types}
-        return [
-            each
+        return {
+            (called, name): kind
             for (called, name), kind in types.items()
             if any(fnmatch.fnmatchcase(name, pattern) for pattern in self.patterns)
-            for each in await self._ask(called, name, kind)
-        ]
-
-    async def _ask(self, called: Called, name: str, kind: str) -> list[Interface]:
-        """Return what is found for a name; reuse a recent answer, or at an error the last one."""
-        known, asked_s = self._answers.get((called, name), ([], -math.inf))
-        if anyio.current_time() < asked_s + self.kept_s:
-            return known
-        with suppress(LinkError):
-            known = await self._fetch(called, name, kind)
-        self._answers[called, name] = (known, anyio.current_time())
-        return known
+        }
 
     async def _fetch(self, called: Called, name: str, kind: str) -> list[Interface]:
         """Return an action or a service; or whether a topic is read or published on, by its ends.
