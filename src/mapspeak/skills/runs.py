@@ -90,14 +90,13 @@ class QuestionBook:
         """Let a question wait, about a picture or the latest."""
         self._n_asked += 1
         about = next(reversed(self._pictures), "") if picture is None else picture
-        shown = self._pictures.get(about)
         question = Question(
             id=f"Q{self._n_asked}",
             text=text,
             answers=answers,
             client=client,
             picture_id=about,
-            picture=shown,
+            picture=self._pictures.get(about),
             within_s=within_s,
             otherwise=otherwise,
         )
@@ -126,19 +125,18 @@ class QuestionBook:
         Raises:
             SkillError: None waits for it, or not that one.
         """
-        open_to = {"", client, *self._gone}
-        mine = [each for each in self.waiting if client is None or each.client in open_to]
-        for each in mine:
-            if question_id is None or each.id == question_id.strip().upper():
-                return each
-        if mine:
-            ids = ", ".join(each.id for each in mine)
-            raise SkillError(f"No question {question_id!r} waits.", hint=f"There wait: {ids}.")
-        others = "Only the client that runs the mission answers it." if self.waiting else ""
-        raise SkillError(
-            "No mission waits for an answer of yours." if others else "No mission waits.",
-            hint=others or "Nothing was answered.",
-        )
+        waiting, open_to = self.waiting, {"", client, *self._gone}
+        mine = {each.id: each for each in waiting if client is None or each.client in open_to}
+        if not mine and waiting:
+            hint = "Only the client that runs the mission answers it."
+            raise SkillError("No mission waits for an answer of yours.", hint=hint)
+        if not mine:
+            raise SkillError("No mission waits.", hint="Nothing was answered.")
+        wanted = next(iter(mine)) if question_id is None else question_id.strip().upper()
+        if wanted not in mine:
+            hint = f"There wait: {', '.join(mine)}."
+            raise SkillError(f"No question {question_id!r} waits.", hint=hint)
+        return mine[wanted]
 
     def answer(self, question: Question, answer: str) -> str:
         """Give an answer, and return it as the mission takes it.
