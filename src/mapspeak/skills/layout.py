@@ -206,7 +206,7 @@ class _Builder:
 
     def _remark(self, way: tuple[str, ...], field: Field) -> str:
         """Return the definition's comment on a field; else the constants, of an only number."""
-        message, said = self._book[way[-1]], field.remark
+        message, said = self._book[way[-1]], field.comment
         wholes = [each for each in message.fields if each.type in WHOLES]
         if not said and message.constants and wholes == [field]:
             said = ", ".join(f"{name}={value}" for name, value in message.constants.items())

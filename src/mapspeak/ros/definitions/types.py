@@ -49,7 +49,7 @@ class Field:
         most: The largest length of a list; None without a bound.
         most_letters: The largest length of a text; None without a bound.
         default: Its default, as written in the definition.
-        remark: The definition's comment on it.
+        comment: On it, as written in the definition.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Field:
     most: int | None = None
     most_letters: int | None = None
     default: str = ""
-    remark: str = dataclasses.field(default="", compare=False)
+    comment: str = dataclasses.field(default="", compare=False)
 
     @property
     def is_message(self) -> bool:
@@ -130,7 +130,7 @@ def _field(found: re.Match[str], package: str) -> Field:
     length = None
     if found["list"]:
         length = int(found["length"] or 0)
-    default, _, remark = found["rest"].partition("#")
+    default, _, comment = found["rest"].partition("#")
     return Field(
         name=found["name"],
         type=_full_type(found["type"], package),
@@ -138,7 +138,7 @@ def _field(found: re.Match[str], package: str) -> Field:
         most=int(found["most"]) if found["most"] else None,
         most_letters=int(found["most_letters"]) if found["most_letters"] else None,
         default=default.strip(),
-        remark=remark.strip("# "),
+        comment=comment.strip("# "),
     )
 
 
