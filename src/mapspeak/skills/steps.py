@@ -103,14 +103,10 @@ class Mission(Skill):
 
 CONTROL = frozenset(StepKind) - {StepKind.LEAF}
 OPTIONS: Mapping[StepKind, frozenset[str]] = {
-    StepKind.SEQUENCE: frozenset(),
-    StepKind.FALLBACK: frozenset(),
+    **dict.fromkeys((StepKind.SEQUENCE, StepKind.FALLBACK), frozenset[str]()),
     StepKind.PARALLEL: frozenset({"needs"}),
-    StepKind.RETRY: frozenset({"do"}),
-    StepKind.TIMEOUT: frozenset({"do"}),
-    StepKind.REPEAT: frozenset({"do"}),
-    StepKind.EVERY: frozenset({"do", "times"}),
-    StepKind.UNTIL: frozenset({"do", "times"}),
+    **dict.fromkeys((StepKind.RETRY, StepKind.TIMEOUT, StepKind.REPEAT), frozenset({"do"})),
+    **dict.fromkeys((StepKind.EVERY, StepKind.UNTIL), frozenset({"do", "times"})),
 }
 FORM = "Write each step as `skill: argument`, or as one of " + ", ".join(sorted(CONTROL)) + "."
 

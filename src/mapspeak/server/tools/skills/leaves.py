@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
 
-from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import GoalError, LinkError, MapError
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Point
 from mapspeak.memory.episodes.observation import ObservationKind
 from mapspeak.places.naming import find_named
 from mapspeak.places.relations.choosing import find_place
@@ -34,7 +35,6 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.guarding import CONDITIONS, Facts, end_within, find_unmet, is_as_wanted
 from mapspeak.skills.runs import QuestionBook
-from mapspeak.worldmodel.remembered import RememberedThing
 
 BATTERY = "sensor_msgs/BatteryState"
 HEAR_S = 3.0
@@ -256,9 +256,11 @@ class Leaves:
         """Drive as the tools do: checked, guarded, one drive at a time."""
         session = self.session
         with session.drives.preparing() as ticket:
-            yaw_deg = given.get("yaw_deg")
-            goal = await session.find_goal(place=given["place"], x=None, y=None, yaw_deg=yaw_deg)
-            outcome = await self._drive_to(goal.pose, goal.title, ticket, on_progress, goal.thing)
+            goal = await session.find_goal(place=given["place"], yaw_deg=given.get("yaw_deg"))
+            drive = await session.drives.start(
+                goal.pose, place=goal.title, ticket=ticket, thing=goal.thing
+            )
+            outcome = await self._follow(drive, on_progress)
         if goal.thing is None or outcome.state is not SkillState.SUCCEEDED:
             return outcome
         here, at = (await session.robot.fetch_pose()).pose.point, goal.thing.thing.position
@@ -279,7 +281,8 @@ class Leaves:
                 goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
                 here = (await session.robot.fetch_pose()).pose
                 if not is_there(here, goal.pose):
-                    outcome = await self._drive_to(goal.pose, goal.title, ticket, on_progress)
+                    drive = await session.drives.start(goal.pose, place=goal.title, ticket=ticket)
+                    outcome = await self._follow(drive, on_progress)
                     if outcome.state is not SkillState.SUCCEEDED:
                         return outcome
         sighting = await look_ahead(session, camera)
@@ -289,17 +292,8 @@ class Leaves:
         seen = ", ".join(each.label for each in sighting.detections)
         return succeeded(picture=picture_id, seen=seen)
 
-    async def _drive_to(
-        self,
-        goal: Pose,
-        title: str,
-        ticket: int,
-        on_progress: OnProgress,
-        thing: RememberedThing | None = None,
-    ) -> SkillOutcome:
-        """Drive to a checked goal; cancelled meanwhile, the robot is left standing."""
-        drives = self.session.drives
-        drive = await drives.start(goal, place=title, ticket=ticket, thing=thing)
+    async def _follow(self, drive: Drive, on_progress: OnProgress) -> SkillOutcome:
+        """Wait for the end of a drive; cancelled meanwhile, the robot is left standing."""
 
         async def tell(report: DriveReport) -> None:
             left_m = report.status.distance_left_m
@@ -307,7 +301,7 @@ class Leaves:
             on_progress(SkillProgress(values=values))
 
         while True:
-            report = await drives.wait(drive.goal_id, wait_s=WAIT_S, on_progress=tell)
+            report = await self.session.drives.wait(drive.goal_id, wait_s=WAIT_S, on_progress=tell)
             if (status := report.status).state.is_final:
                 break
         if status.state is GoalState.ARRIVED:
@@ -322,17 +316,16 @@ class Leaves:
         pose = (await session.robot.fetch_pose()).pose
         room_id = await session.find_room_id(pose.point)
 
-        def keep() -> str:
-            return session.episodes.keep(
-                ObservationKind.NOTE,
-                pose=pose,
-                text=text,
-                stamp_s=session.robot.now_s,
-                room_id=room_id,
-                name_map=session.memory.name_map,
-            ).fault
-
-        fault = await session.compute(keep)
+        keep = partial(
+            session.episodes.keep,
+            ObservationKind.NOTE,
+            pose=pose,
+            text=text,
+            stamp_s=session.robot.now_s,
+            room_id=room_id,
+            name_map=session.memory.name_map,
+        )
+        fault = (await session.compute(keep)).fault
         return failed(SkillCode.LOST, fault) if fault else succeeded(text=text, room=room_id or "")
 
     async def _check(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
