@@ -104,11 +104,12 @@ class Hold:
 
     def servers_of(self, address: str) -> tuple[int, ...]:
         """Return the other processes that serve the robot at an address."""
-        served = (told for _, told in _read_all(self.folder / SERVED))
+        # A simulated robot has none, and many servers may have been killed: each left a file.
+        served = _read_all(self.folder / SERVED) if address else ()
         found = {
             int(told["process"])
-            for told in served
-            if address and told.get("address") == address and is_running(told.get("process"))
+            for _, told in served
+            if told.get("address") == address and is_running(told.get("process"))
         }
         return tuple(sorted(found - {os.getpid()}))
 

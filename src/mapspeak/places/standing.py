@@ -7,7 +7,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory.things.approach import COMFORT_M, OVERLOOK_M, find_overlook
+from mapspeak.memory.things.approach import (
+    COMFORT_M,
+    OVERLOOK_FAR_M,
+    OVERLOOK_M,
+    find_overlook,
+)
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, floor_by_heading, heading_rad, is_in_sight
@@ -170,7 +175,7 @@ def find_stand_off(world: WorldModel, remembered: RememberedThing) -> Pose | Non
     seen_m = min(
         (view.place.distance_to(target) for view in remembered.thing.supporting), default=math.inf
     )
-    stands, _ = spread_places(world)
+    stands, _ = spread_places(world, around=target, reach_m=seen_m)
     away_m = np.hypot(stands[:, 0] - target.x, stands[:, 1] - target.y)
     fronts = set(world.find_fronts(remembered))
     for index in np.argsort(away_m, kind="stable")[: np.count_nonzero(away_m < seen_m)]:
@@ -187,7 +192,8 @@ def find_overlook_of(world: WorldModel, remembered: RememberedThing) -> Pose | N
     if thing.whereabouts is None or (thing.uncertainty_m or 0.0) <= OVERLOOK_M:
         return None
     if remembered not in known:
-        stands, ways_m = spread_places(world)
+        middle = Point(*np.median(thing.whereabouts, axis=0).tolist())
+        stands, ways_m = spread_places(world, around=middle, reach_m=OVERLOOK_FAR_M)
         seen_from = [view.place for view in thing.supporting]
         sight = world.recollection.found.sight
         known[remembered] = find_overlook(sight, stands, ways_m, seen_from, thing.whereabouts)
@@ -195,22 +201,35 @@ def find_overlook_of(world: WorldModel, remembered: RememberedThing) -> Pose | N
 
 
 def spread_places(
-    world: WorldModel, *, within: Mask | None = None
+    world: WorldModel,
+    *,
+    within: Mask | None = None,
+    around: Point | None = None,
+    reach_m: float = math.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """Return places spread over the reachable floor, each where its square has most room.
 
     Args:
         within: Which floor matters, as a mask of the map; None where all does.
+        around: Squares that are wholly farther from it than `reach_m` may be left out.
 
     Returns:
         The places, shape (n, 2), and how far the robot has to drive to each, in metres.
     """
-    counts = world.distances.reachable if within is None else world.distances.reachable & within
-    clear_m = np.where(counts, world.map.clearance_m, 0.0)
-    rows, cols = np.nonzero(clear_m >= world.radius_m + NARROW_COMFORT_M)
     every = max(round(EVERY_M / world.grid.resolution_m), 1)
+    down, across = slice(0, world.grid.n_rows), slice(0, world.grid.n_cols)
+    if around is not None and math.isfinite(reach_m):
+        down, across = (
+            slice(near.start // every * every, -(-near.stop // every) * every)
+            for near in world.grid.window_around(around, reach_m)
+        )
+    window = down, across
+    counts = world.distances.reachable[window]
+    counts = counts if within is None else counts & within[window]
+    clear_m = np.where(counts, world.map.clearance_m[window], 0.0)
+    rows, cols = np.nonzero(clear_m >= world.radius_m + NARROW_COMFORT_M)
     roomiest_first = np.argsort(-clear_m[rows, cols], kind="stable")
-    rows, cols = rows[roomiest_first], cols[roomiest_first]
+    rows, cols = rows[roomiest_first] + down.start, cols[roomiest_first] + across.start
     squares = (rows // every) * (world.grid.n_cols // every + 1) + cols // every
     _, first = np.unique(squares, return_index=True)
     points = world.grid.points_at(rows[first], cols[first])

@@ -1,10 +1,10 @@
 """Looks that should have shown a thing and did not, and things that stand elsewhere since."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from datetime import datetime
 from functools import cached_property
-from itertools import chain, compress, islice, zip_longest
+from itertools import chain, islice, zip_longest
 
 import numpy as np
 
@@ -38,7 +38,6 @@ class UnseenThings:
         at: Where these are, shape (n, 2), metres.
         numbers: Of these, by their identity.
         looks: The waypoints by name.
-        looks_at: Where these are, in the order of the file, shape (n, 2), metres.
         known: What looks say against each thing that was looked into, by its identity.
     """
 
@@ -51,13 +50,13 @@ class UnseenThings:
         self.placed = [thing for thing in found.things if thing.position is not None]
         self.numbers = {id(thing): number for number, thing in enumerate(self.placed)}
         self.at = self._place(earlier)
-        self.looks_at = np.empty((len(self._waypoints), 2))
+        self._looks_at = np.full((len(self._waypoints), 5), np.nan)
         before = () if earlier is None else earlier._waypoints  # noqa: SLF001 - of this class
         if earlier is not None:
-            self.looks_at[: len(before)] = earlier.looks_at[: len(self._waypoints)]
+            self._looks_at[: len(before)] = earlier._looks_at[: len(self._waypoints)]  # noqa: SLF001
         for i, (look, then) in enumerate(zip_longest(self._waypoints, before)):
             if look is not None and look is not then:
-                self.looks_at[i] = look.pose.x, look.pose.y
+                self._looks_at[i] = look.pose.x, look.pose.y, look.pose.yaw_rad, np.nan, np.nan
         self.known: dict[int, tuple[MemoryFinding, ...]] = {}
         if earlier is not None and earlier.known:
             self._take_over(earlier)
@@ -108,15 +107,8 @@ class UnseenThings:
         return self.numbers.get(id(thing))
 
     def find_all(self) -> Iterator[MemoryFinding]:
-        """Return the findings about all things: for each look in turn, then what was moved."""
-        of_look: defaultdict[int, list[MemoryFinding]] = defaultdict(list)
-        missed = [list(self._missed(thing)) for thing in self.placed]
-        looks = [finding for look in self._waypoints for finding in self._not_shown(look)]
-        for finding in looks:
-            of_look[id(finding.things[0])].append(finding)
-        for thing, own in zip(self.placed, missed, strict=True):
-            self.known[id(thing)] = (*own, *of_look[id(thing)])
-        yield from chain(*missed, looks)
+        """Return the findings about all things: of each in turn what looks miss, then the moved."""
+        yield from chain.from_iterable(map(self._unseen, self.placed))
         for alike in self._alike.values():
             for old in alike:
                 if self._is_gone(old):
@@ -162,12 +154,7 @@ class UnseenThings:
 
     def _unseen(self, thing: Thing) -> tuple[MemoryFinding, ...]:
         if id(thing) not in self.known:
-            number = self.numbers[id(thing)]
-            off_m = np.hypot(*(self.looks_at - self.at[number]).T)
-            near = [self._waypoints[i] for i in np.flatnonzero(off_m <= NEAR_M).tolist()]
-            looks = _find_ahead(near, thing)
-            shown = (finding for look in looks for finding in self._not_shown(look, [number]))
-            self.known[id(thing)] = (*self._missed(thing), *shown)
+            self.known[id(thing)] = (*self._missed(thing), *self._not_shown(thing))
         return self.known[id(thing)]
 
     def _missed(self, thing: Thing) -> Iterator[MemoryFinding]:
@@ -185,37 +172,36 @@ class UnseenThings:
                     n_since=view.landmark.n_missed,
                 )
 
-    def _not_shown(
-        self, waypoint: Waypoint, among: Sequence[int] | None = None
-    ) -> Iterator[MemoryFinding]:
-        """Return unnamed things that a waypoint shows within the cone of what it names.
+    def _not_shown(self, thing: Thing) -> Iterator[MemoryFinding]:
+        """Return the looks that show a thing within the cone of what they name, and not by name."""
+        point = Point(*self.at[self.numbers[id(thing)]].tolist())
+        looks, shown = self._measure_shown(thing)
+        for i in np.flatnonzero(shown >= LEAST_SHOWN_RATIO).tolist():
+            look = looks[i]
+            bearing_rad = wrap_angle(look.pose.point.bearing_to(point) - look.pose.yaw_rad)
+            if not self._is_told(thing, look, bearing_rad):
+                yield MemoryFinding(
+                    kind=FindingKind.NOT_SEEN,
+                    waypoints=(look.name,),
+                    things=(thing,),
+                    far_m=look.pose.point.distance_to(point),
+                    n_since=int(_is_later(look, thing.last_seen)),
+                    shown_ratio=float(shown[i]),
+                )
 
-        Args:
-            among: The numbers of things that are near it; all that are where None.
-        """
-        cone = find_cone(waypoint)
-        if cone is None:
-            return
-        pose = waypoint.pose
-        if among is None:
-            off_m = np.hypot(*(self.at - (pose.x, pose.y)).T)
-            among = np.flatnonzero(off_m <= NEAR_M).tolist()
-        shown = _measure_shown(self.found, waypoint, [self.placed[i] for i in among], cone)
-        for i, shown_ratio in zip(among, shown.tolist(), strict=True):
-            if shown_ratio < LEAST_SHOWN_RATIO:
-                continue
-            thing, point = self.placed[i], Point(*self.at[i].tolist())
-            bearing_rad = wrap_angle(pose.point.bearing_to(point) - pose.yaw_rad)
-            if self._is_told(thing, waypoint, bearing_rad):
-                continue
-            yield MemoryFinding(
-                kind=FindingKind.NOT_SEEN,
-                waypoints=(waypoint.name,),
-                things=(thing,),
-                far_m=pose.point.distance_to(point),
-                n_since=int(_is_later(waypoint, thing.last_seen)),
-                shown_ratio=shown_ratio,
-            )
+    def _measure_shown(self, thing: Thing) -> tuple[list[Waypoint], FloatArray]:
+        """Return looks, and how likely each shows a thing: over all that it may be, in sight."""
+        off_m = np.hypot(*(self._looks_at[:, :2] - self.at[self.numbers[id(thing)]]).T)
+        near = np.flatnonzero(off_m <= NEAR_M)
+        for i in near[np.isnan(self._looks_at[near, 3])].tolist():
+            self._looks_at[i, 3:] = find_cone(self._waypoints[i]) or (np.inf, -np.inf)
+        spots = np.empty((0, 2)) if thing.whereabouts is None else thing.whereabouts
+        is_ahead = _are_ahead(self._looks_at[near], spots)
+        n_spots = max(len(spots), 1)
+        enough = np.flatnonzero(is_ahead.sum(axis=1) >= LEAST_SHOWN_RATIO * n_spots)
+        looks = [self._waypoints[i] for i in near[enough].tolist()]
+        in_sight = self.found.find_sight_ratios(looks, spots)
+        return looks, np.where(is_ahead[enough], in_sight, 0.0).sum(axis=1) / n_spots
 
     def _is_told(self, thing: Thing, waypoint: Waypoint, bearing_rad: float) -> bool:
         """Return True when a waypoint names what may be a thing, or counts that it does not.
@@ -279,46 +265,13 @@ def _may_be(thing: Thing, landmark: Landmark, bearing_rad: float, owner: Thing |
     return is_ahead and not is_others and name_the_same(landmark.label, thing.label)
 
 
-def _measure_shown(
-    found: Things, waypoint: Waypoint, things: Sequence[Thing], cone: tuple[float, float]
-) -> FloatArray:
-    """Return how likely a look shows each thing: over all that it may be, near, ahead, in sight."""
-    spots = [_spots_of(each) for each in things]
-    points = np.concatenate([np.empty((0, 2)), *spots])
-    ahead = np.flatnonzero(_are_ahead([waypoint], [cone], points))
-    in_sight = np.zeros(len(points))
-    in_sight[ahead] = found.find_sight_ratios(waypoint, points[ahead])
-    n_spots = np.array([len(each) for each in spots], dtype=np.intp)
-    sums = np.bincount(
-        np.repeat(np.arange(len(spots)), n_spots), weights=in_sight, minlength=len(spots)
-    )
-    return sums / np.maximum(n_spots, 1)
-
-
-def _find_ahead(looks: Sequence[Waypoint], thing: Thing) -> list[Waypoint]:
-    """Return the looks with so much ahead of where a thing may be that they might show it."""
-    cones = [find_cone(look) or (np.inf, -np.inf) for look in looks]
-    spots = _spots_of(thing)
-    n_ahead = _are_ahead(looks, cones, spots).sum(axis=1)
-    is_enough = (n_ahead >= LEAST_SHOWN_RATIO * max(len(spots), 1)).tolist()
-    return list(compress(looks, is_enough))
-
-
-def _are_ahead(
-    looks: Sequence[Waypoint], cones: Sequence[tuple[float, float]], points: FloatArray
-) -> Mask:
+def _are_ahead(looks: FloatArray, points: FloatArray) -> Mask:
     """Return True for each look (row) and point (column) that is near and in the look's cone."""
-    poses = np.array([(look.pose.x, look.pose.y, look.pose.yaw_rad) for look in looks])
-    x, y, yaws = poses.reshape(-1, 3, 1).transpose(1, 0, 2)
-    least, most = np.array(cones).reshape(-1, 2, 1).transpose(1, 0, 2)
+    x, y, yaws, least, most = looks.T[..., None]
     east, north = points[:, 0] - x, points[:, 1] - y
     off_rad = np.remainder(np.arctan2(north, east) - yaws + np.pi, 2 * np.pi) - np.pi
     is_near = np.hypot(east, north) <= NEAR_M
     return np.asarray((least <= off_rad) & (off_rad <= most) & is_near)
-
-
-def _spots_of(thing: Thing) -> FloatArray:
-    return np.empty((0, 2)) if thing.whereabouts is None else thing.whereabouts
 
 
 def _is_newer(new: Thing, old: Thing) -> bool:

@@ -90,16 +90,21 @@ class Things:
     pools: dict[frozenset[str], Pool]
     n_joined: int = 0
 
-    def find_sight_ratios(self, waypoint: Waypoint, points: FloatArray) -> FloatArray:
-        """Return for each point how likely a waypoint has it in sight: less over furniture."""
-        pose, seen = waypoint.pose, self._surroundings(waypoint)
-        ways = points - (pose.x, pose.y)
-        far_m = np.hypot(*ways.T)
-        rays = bearing_index(np.arctan2(ways[:, 1], ways[:, 0]) - self.sight.grid.origin.yaw_rad)
+    def find_sight_ratios(self, looks: Sequence[Waypoint], points: FloatArray) -> FloatArray:
+        """Return how likely each waypoint (row) has each point in sight: less over furniture."""
+        seen = [self._surroundings(each) for each in looks]
+        at = np.array([(each.pose.x, each.pose.y) for each in seen]).reshape(-1, 2, 1)
+        ways = points.T - at
+        far_m = np.hypot(ways[:, 0], ways[:, 1])
+        yaw_rad = self.sight.grid.origin.yaw_rad
+        rays = bearing_index(np.arctan2(ways[:, 1], ways[:, 0]) - yaw_rad)
         # A thing is wider than a ray, so that its edge shows where a corner hides its middle.
         is_near, is_far = (
-            far_m <= find_farthest_beside(each)[rays] + SURFACE_M
-            for each in (seen.near_m, seen.far_m)
+            far_m <= np.take_along_axis(find_farthest_beside(met_m), rays, axis=1) + SURFACE_M
+            for met_m in (
+                np.array([each.near_m for each in seen]).reshape(-1, N_RAYS),
+                np.array([each.far_m for each in seen]).reshape(-1, N_RAYS),
+            )
         )
         return np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
 
@@ -307,7 +312,7 @@ def _points_past(
         and _off_rad(view.waypoint.pose, bearing_rad, position) >= ELSEWHERE_RAD
         and _off_rad(view.waypoint.pose, 0.0, position) <= IN_PICTURE_RAD
         and name_the_same(view.landmark.label, group[0].landmark.label)
-        and bool(found.find_sight_ratios(view.waypoint, at)[0] > LIKELY_RATIO)
+        and bool(found.find_sight_ratios([view.waypoint], at).item() > LIKELY_RATIO)
     )
 
 

@@ -187,8 +187,12 @@ better known."""
 
 
 def find_farthest_beside(far_m: FloatArray) -> FloatArray:
-    """Return the farthest of what is met along each ray and those beside it."""
-    return np.asarray(far_m[_BESIDE].max(axis=1))
+    """Return the farthest of what is met along each ray and those beside it.
+
+    Args:
+        far_m: By ray; or a row for each place.
+    """
+    return np.asarray(far_m[..., _BESIDE].max(axis=-1))
 
 
 _LEAST_MET = 0.05
