@@ -351,7 +351,8 @@ class WorldModel:
         if position is None:
             return seen_from
         sight = self.recollection.found.sight
-        return _keep(self.reach.fronts, remembered, lambda: find_fronts(sight, position, seen_from))
+        lines = [(place, position) for place in seen_from]
+        return _keep(self.reach.fronts, remembered, lambda: find_fronts(sight, lines))
 
     def _find_room_on_line(self, end: Point, start: Point) -> str | None:
         """Return the room of the last floor on a line: what hangs on a wall is in none itself."""

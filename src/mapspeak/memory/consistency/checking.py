@@ -1,9 +1,10 @@
 """Check records against the map, their rooms and each other."""
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import chain, product
+from itertools import chain, compress, product
 
 import numpy as np
 
@@ -220,19 +221,20 @@ class MemoryCheck:
         """Return which of the first things are in the place of one and called otherwise."""
         placed, at = self._unseen.placed, self._unseen.at
         off_m = np.hypot(*(at[:n_others] - at[number]).T)
-        for other in np.flatnonzero(off_m <= ONE_PLACE_M).tolist():
-            one, two = placed[min(other, number)], placed[max(other, number)]
-            is_seen_beside = set(one.waypoints) & set(two.waypoints)
-            if (
-                not is_seen_beside
-                and not name_the_same(two.label, one.label)
-                and _share_a_side(self._unseen.found, self._rooms, one, two)
-            ):
-                yield MemoryFinding(
-                    kind=FindingKind.TWO_LABELS,
-                    waypoints=(*one.waypoints, *two.waypoints),
-                    things=(one, two),
-                )
+        near = np.flatnonzero(off_m <= ONE_PLACE_M).tolist()
+        pairs = [(placed[min(each, number)], placed[max(each, number)]) for each in near]
+        pairs = [
+            (one, two)
+            for one, two in pairs
+            if set(one.waypoints).isdisjoint(two.waypoints)
+            and not name_the_same(two.label, one.label)
+        ]
+        for one, two in _find_sharing_a_side(self._unseen.found, self._rooms, pairs):
+            yield MemoryFinding(
+                kind=FindingKind.TWO_LABELS,
+                waypoints=(*one.waypoints, *two.waypoints),
+                things=(one, two),
+            )
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
@@ -243,25 +245,40 @@ class MemoryCheck:
         return find_misfiled(self._rooms, self._places.waypoints) if self._rooms else {}
 
 
-def _share_a_side(found: Things, rooms: RoomMap | None, one: Thing, two: Thing) -> bool:
-    """Return True when the floor before both is in one room, with no wall between."""
-    before_one, before_two = (
-        find_fronts(found.sight, each.position, [view.place for view in each.supporting])
-        for each in (one, two)
-        if each.position is not None
-    )
-    return any(
-        _is_open_between(found.sight, start, end) and not _are_in_two_rooms(rooms, start, end)
-        for start, end in product(before_one, before_two)
-    )
+def _find_sharing_a_side(
+    found: Things, rooms: RoomMap | None, pairs: Sequence[tuple[Thing, Thing]]
+) -> Iterator[tuple[Thing, Thing]]:
+    """Return the pairs before both of which the floor is in one room, with no wall between."""
+    things = {id(each): each for each in chain.from_iterable(pairs)}
+    seen = [(key, view.place) for key, each in things.items() for view in each.supporting]
+    lines = [(place, things[key].position or place) for key, place in seen]
+    fronts: defaultdict[int, list[Point]] = defaultdict(list)
+    for (key, _), front in zip(seen, find_fronts(found.sight, lines), strict=True):
+        fronts[key].append(front)
+    between = [
+        (i, *ends)
+        for i, (one, two) in enumerate(pairs)
+        for ends in product(fronts[id(one)], fronts[id(two)])
+    ]
+    is_open = _are_open([ends for _, *ends in between], found.sight)
+    is_shared = {
+        i
+        for i, start, end in compress(between, is_open)
+        if not _are_in_two_rooms(rooms, start, end)
+    }
+    return (pair for i, pair in enumerate(pairs) if i in is_shared)
 
 
-def _is_open_between(sight: SightMap, start: Point, end: Point) -> bool:
-    grid, away_m = sight.grid, start.distance_to(end)
-    at = grid.fractional_cells_at(np.array([[start.x, start.y]]))
-    angle = np.array([start.bearing_to(end) - grid.origin.yaw_rad])
-    open_m = sight.cast(sight.wall_off, at, angle, begin_m=0.0, reach_m=away_m)
-    return open_m.item() >= away_m - grid.resolution_m
+def _are_open(lines: Sequence[Sequence[Point]], sight: SightMap) -> Sequence[bool]:
+    """Return for each line True where nothing that one cannot see over is on it."""
+    ends = np.array([(start.x, start.y, end.x, end.y) for start, end in lines]).reshape(-1, 4)
+    away = ends[:, 2:] - ends[:, :2]
+    away_m = np.hypot(away[:, 0], away[:, 1])
+    angles = np.arctan2(away[:, 1], away[:, 0]) - sight.grid.origin.yaw_rad
+    starts = sight.grid.fractional_cells_at(ends[:, :2])
+    open_m = sight.cast(sight.wall_off, starts, angles, begin_m=0.0, reach_m=away_m)
+    is_open: list[bool] = (open_m >= away_m - sight.grid.resolution_m).tolist()
+    return is_open
 
 
 def _are_in_two_rooms(rooms: RoomMap | None, start: Point, end: Point) -> bool:

@@ -95,7 +95,8 @@ def find_stands(
         others: Where things are near it, itself too, shape (n, 2): the map may not show these.
     """
     points, clear_m = _reachable_near(sight, distances, target, off_m + SPREAD_M)
-    fronts = find_fronts(sight, target, seen_from) if fronts is None else fronts
+    lines = [(place, target) for place in seen_from]
+    fronts = fronts or find_fronts(sight, lines) or [target]
     is_seen = _are_in_sight(sight, fronts, points)
     is_roomy = is_seen & (clear_m >= distances.radius_m + NARROW_COMFORT_M)
     kept = is_roomy if is_roomy.any() else is_seen
@@ -192,11 +193,11 @@ def measure_faced(
 
 def _are_hidden(points: FloatArray, target: Point, others: FloatArray) -> Mask:
     """Return True for points from which another thing stands before a thing."""
-    ways = np.array([target.x, target.y]) - points
-    far_m = np.maximum(np.hypot(ways[:, :1], ways[:, 1:]), 1e-6)
-    to_others = others[None] - points[:, None]
-    along_m = (to_others * ways[:, None]).sum(axis=2) / far_m
-    aside_m = np.abs(to_others[..., 1] * ways[:, :1] - to_others[..., 0] * ways[:, 1:]) / far_m
+    east, north = (target.x - points[:, :1], target.y - points[:, 1:])
+    far_m = np.maximum(np.hypot(east, north), 1e-6)
+    others_east, others_north = (others[:, axis] - points[:, axis, None] for axis in (0, 1))
+    along_m = (others_east * east + others_north * north) / far_m
+    aside_m = np.abs(others_north * east - others_east * north) / far_m
     is_before = (along_m > 0) & (along_m < far_m - OTHER_M) & (aside_m < OTHER_M)
     return np.asarray(is_before.any(axis=1))
 
@@ -258,23 +259,22 @@ def _floor_near(
     return rows[is_near], cols[is_near], points[is_near]
 
 
-def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> list[Point]:
-    """Return, for each who saw the thing, the last floor before it on the line there.
+def find_fronts(sight: SightMap, lines: Sequence[tuple[Point, Point]]) -> list[Point]:
+    """Return the last floor before a thing on each line, from where it was seen to its middle.
 
     Its middle may lie deep in its own body, where nobody can look.
     """
-    if not seen_from:
-        return [target]
-    starts = np.array([(place.x, place.y) for place in seen_from])
-    ways = np.arctan2(target.y - starts[:, 1], target.x - starts[:, 0])
+    ends = np.array([(start.x, start.y, end.x, end.y) for start, end in lines]).reshape(-1, 4)
+    starts, away = ends[:, :2], ends[:, 2:] - ends[:, :2]
+    ways = np.arctan2(away[:, 1], away[:, 0])
     in_grid = ways - sight.grid.origin.yaw_rad
-    far_m = np.hypot(target.x - starts[:, 0], target.y - starts[:, 1])
+    far_m = np.hypot(away[:, 0], away[:, 1])
     near_m = sight.cast(sight.obstacle_off, sight.grid.fractional_cells_at(starts), in_grid)
     # What is seen over furniture has its front behind it.
     is_over = near_m < far_m - BODY_M
     until_m = np.where(is_over, far_m, np.minimum(near_m, far_m)) - _STEP_BACK_M
-    ends = starts + until_m[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1)
-    return [Point(x, y) for x, y in _last_floor(sight.grid, starts, ends).tolist()]
+    fronts = starts + until_m[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+    return [Point(x, y) for x, y in _last_floor(sight.grid, starts, fronts).tolist()]
 
 
 def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> FloatArray:
