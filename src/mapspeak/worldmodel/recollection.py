@@ -11,14 +11,12 @@ from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.memory.consistency.checking import MemoryCheck
 from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
-from mapspeak.memory.consistency.unseen import UnseenThings
+from mapspeak.memory.consistency.unseen import UnseenThings, find_near
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
@@ -174,8 +172,8 @@ class Recollection:
         known = self._around.get((point, reach_m))
         if known is None:
             at = self.unseen.at
-            off_m = np.hypot(at[:, 0] - point.x, at[:, 1] - point.y)
-            known = self._around[point, reach_m] = at[off_m <= reach_m]
+            known = at[find_near(at, (point.x, point.y), reach_m)]
+            self._around[point, reach_m] = known
         return known
 
     def find_place(self, name: str) -> RememberedPlace | None:

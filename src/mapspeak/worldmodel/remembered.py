@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, repeat
 
 from mapspeak.geometry import Point
-from mapspeak.memory import Waypoint
+from mapspeak.memory import Waypoint, name_key
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.thing import Thing
 from mapspeak.spatial.rooms.identity import match_best_first
@@ -56,11 +56,23 @@ def number_places(
     return tuple(
         before
         if before is not None and before.waypoint is waypoint
-        else RememberedPlace(id=f"W{number}", waypoint=waypoint)
+        else RememberedPlace(id=_place_id(number), waypoint=waypoint)
         for number, (waypoint, before) in enumerate(
-            zip(waypoints, chain(earlier, repeat(None)), strict=False), start=1
+            zip(waypoints, chain(earlier, repeat(None)), strict=False)
         )
     )
+
+
+def find_place_id(waypoints: Sequence[Waypoint], name: str) -> str:
+    """Return the id of the place of a name; of exactly that name if there is one."""
+    # Keys of names cost much, and hardly ever are they needed.
+    exact = (number for number, each in enumerate(waypoints) if each.name == name)
+    alike = (n for n, each in enumerate(waypoints) if name_key(each.name) == name_key(name))
+    return _place_id(next(chain(exact, alike)))
+
+
+def _place_id(number: int) -> str:
+    return f"W{number + 1}"
 
 
 def number_things(

@@ -4,7 +4,7 @@ Only this module holds back records of other maps: readers get no waypoint, even
 not aligned with the robot's map.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
@@ -52,33 +52,33 @@ class FramedMemory(MemoryStore):
         last = self._read
         if last is None or last.memory is not memory or last.here != here:
             is_same = last is not None and (last.here, last.memory.frames) == (here, memory.frames)
-            known = last.shown if last is not None and is_same else {}
-            last = self._read = self._place_all(memory, here, known)
+            last = self._read = self._place_all(memory, here, last if is_same else None)
         events = self.store.read_events()
         n_elsewhere = len(events) - len(self._place_events(events, memory.frames))
         return replace(last.told, n_events_elsewhere=n_elsewhere)
 
     def _place_all(
-        self, memory: SemanticMap, here: tuple[object, ...], known: Mapping[int, "_Shown"]
+        self, memory: SemanticMap, here: tuple[object, ...], earlier: "_Read | None"
     ) -> "_Read":
-        shown = {
-            id(each): known.get(id(each)) or self._show(each, memory.frames)
-            for each in memory.waypoints
-        }
-        present = [(told, is_here) for _, told, is_here in shown.values() if told is not None]
+        known = dict[int, _Shown]()
+        if earlier is not None:
+            known = dict(zip(map(id, earlier.memory.waypoints), earlier.shown, strict=True))
+        shown = [
+            known.get(id(each)) or self._show(each, memory.frames) for each in memory.waypoints
+        ]
         told = replace(
             memory,
-            waypoints=tuple(told for told, is_here in present if is_here),
-            elsewhere=tuple(told for told, is_here in present if not is_here),
+            waypoints=tuple(told for told, is_here in shown if is_here and told is not None),
+            elsewhere=tuple(told for told, is_here in shown if not is_here and told is not None),
         )
         return _Read(memory=memory, here=here, told=told, shown=shown)
 
     def _show(self, waypoint: Waypoint, frames: Frames) -> "_Shown":
         if waypoint.is_gone:
-            return waypoint, None, False
+            return None, False
         present = waypoint.present()
         placed = self._place(present, frames) if self.keeper.has_met else present
-        return waypoint, placed or present, placed is not None
+        return placed or present, placed is not None
 
     def read_events(self) -> tuple[Event, ...]:
         """Return the events in the frame of the robot's map, and no others.
@@ -172,8 +172,8 @@ class FramedMemory(MemoryStore):
         return waypoint.moved(motion, here)
 
 
-_Shown = tuple[Waypoint, Waypoint | None, bool]
-"""A record; as it is told, None where it is gone; whether it is on the robot's map."""
+_Shown = tuple[Waypoint | None, bool]
+"""A record as it is told, None where it is gone; whether it is on the robot's map."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,10 +182,10 @@ class _Read:
 
     Attributes:
         here: What was known of the robot's map.
-        shown: Each record by its identity: most are the very same the next time.
+        shown: Each record of the memory: most are the very same the next time.
     """
 
     memory: SemanticMap
     here: tuple[object, ...]
     told: SemanticMap
-    shown: dict[int, _Shown]
+    shown: list[_Shown]

@@ -11,7 +11,7 @@ import numpy as np
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.consistency.filing import FARTHEST_M, check_rooms, file_of, find_misfiled
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
-from mapspeak.memory.consistency.unseen import UnseenThings
+from mapspeak.memory.consistency.unseen import UnseenThings, find_near
 from mapspeak.memory.things.approach import find_fronts
 from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.labels import name_the_same
@@ -122,7 +122,7 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
     """Return pairs of waypoints with nearly the same pose and landmarks."""
     at = np.array([(each.pose.x, each.pose.y) for each in waypoints]).reshape(-1, 2)
     for i, waypoint in enumerate(waypoints):
-        for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= TWIN_M).tolist():
+        for j in find_near(at[:i], at[i], TWIN_M).tolist():
             other = waypoints[j]
             turn_rad = abs(wrap_angle(waypoint.pose.yaw_rad - other.pose.yaw_rad))
             named = _labels(waypoint)
@@ -220,8 +220,7 @@ class MemoryCheck:
     def _two_labels(self, number: int, *, n_others: int) -> Iterator[MemoryFinding]:
         """Return which of the first things are in the place of one and called otherwise."""
         placed, at = self._unseen.placed, self._unseen.at
-        off_m = np.hypot(*(at[:n_others] - at[number]).T)
-        near = np.flatnonzero(off_m <= ONE_PLACE_M).tolist()
+        near = find_near(at[:n_others], at[number], ONE_PLACE_M).tolist()
         pairs = [(placed[min(each, number)], placed[max(each, number)]) for each in near]
         pairs = [
             (one, two)

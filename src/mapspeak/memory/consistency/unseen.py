@@ -15,7 +15,7 @@ from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.thing import Thing
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
-from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 
 LEAST_SHOWN_RATIO = 0.25
 """A look that shows a thing less likely says nothing of it."""
@@ -96,7 +96,7 @@ class UnseenThings:
         names.update(each.name for each in others if looks.get(each.name) != looked.get(each.name))
         is_stale = np.zeros(len(self.placed), dtype=np.bool_)
         for look in filter(None, (each.get(name) for each in (looks, looked) for name in names)):
-            is_stale |= np.hypot(*(self.at - (look.pose.x, look.pose.y)).T) <= NEAR_M
+            is_stale[find_near(self.at, (look.pose.x, look.pose.y), NEAR_M)] = True
         for known, findings in earlier.known.items():
             number = self.numbers.get(known)
             if number is not None and not is_stale[number]:
@@ -191,8 +191,7 @@ class UnseenThings:
 
     def _measure_shown(self, thing: Thing) -> tuple[list[Waypoint], FloatArray]:
         """Return looks, and how likely each shows a thing: over all that it may be, in sight."""
-        off_m = np.hypot(*(self._looks_at[:, :2] - self.at[self.numbers[id(thing)]]).T)
-        near = np.flatnonzero(off_m <= NEAR_M)
+        near = find_near(self._looks_at, self.at[self.numbers[id(thing)]], NEAR_M)
         for i in near[np.isnan(self._looks_at[near, 3])].tolist():
             self._looks_at[i, 3:] = find_cone(self._waypoints[i]) or (np.inf, -np.inf)
         spots = np.empty((0, 2)) if thing.whereabouts is None else thing.whereabouts
@@ -247,6 +246,18 @@ class UnseenThings:
             and self._is_gone(other) is not is_gone
         )
         return list(islice(partners, 2))
+
+
+def find_near(
+    places: FloatArray, point: FloatArray | tuple[float, float], reach_m: float
+) -> IntArray:
+    """Return which of many places are within reach of a point.
+
+    Args:
+        places: Their first two columns are their x and y.
+    """
+    east, north = places[:, 0] - point[0], places[:, 1] - point[1]
+    return np.flatnonzero(east * east + north * north <= reach_m * reach_m)
 
 
 def _is_later(look: Waypoint, last_seen: datetime | None) -> bool:

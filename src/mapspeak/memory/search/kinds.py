@@ -171,9 +171,10 @@ class KindIndex:
     """The kinds of some entries, and the names of all other kinds."""
 
     def __init__(self, vectors: TextVectors | None) -> None:
-        names = [(name, kind) for kind in read_kinds() for name in kind.names]
-        uses = [(use, kind) for kind in read_kinds() for use in kind.uses]
-        self._kinds = [kind for _, kind in (*names, *uses)]
+        numbered = list(enumerate(read_kinds()))
+        names = [(name, number) for number, kind in numbered for name in kind.names]
+        uses = [(use, number) for number, kind in numbered for use in kind.uses]
+        self._numbers = np.array([number for _, number in (*names, *uses)], dtype=np.intp)
         self._n_names = len(names)
         texts = [text for text, _ in (*names, *uses)]
         self._embedded = vectors
@@ -184,7 +185,7 @@ class KindIndex:
         self._said_of: dict[tuple[str, ...], Texts] = {}
         self._words = WordIndex() if vectors is None else None
         if self._words is not None:
-            for number, kind in enumerate(read_kinds()):
+            for number, kind in numbered:
                 self._words.add(number, _texts_of(kind))
 
     def add(self, entries: Sequence[Entry]) -> None:
@@ -214,10 +215,9 @@ class KindIndex:
         return told.union(*described)
 
     def _find_absent(self) -> NDArray[np.bool_]:
+        """Return for each kind, in the order of all, True if it is not remembered."""
         if self._absent is None:
-            self._absent = np.array(
-                [not self._n_known.get(kind) for kind in self._kinds], dtype=bool
-            )
+            self._absent = np.array([not self._n_known.get(kind) for kind in read_kinds()])
         return self._absent
 
     def say_of(self, entry: Entry) -> Texts:
@@ -247,13 +247,13 @@ class KindIndex:
         Returns:
             Its first name, and the similarity.
         """
-        absent = self._find_absent()
+        absent = self._find_absent()[self._numbers]
         if self._vectors is None or not absent.any():
             return None
         ratios = np.round(self._vectors @ vector, 6)
         ratios[self._n_names :] -= LESS_FOR_COMMON
-        number = int(np.where(absent, ratios, -1.0).argmax())
-        return self._kinds[number].names[0], float(ratios[number])
+        row = int(np.where(absent, ratios, -1.0).argmax())
+        return read_kinds()[self._numbers[row]].names[0], float(ratios[row])
 
     def find_missing_said(self, request: str) -> tuple[str, float] | None:
         """Find the kind that is not remembered and says most of a request by its names and uses."""
@@ -263,15 +263,13 @@ class KindIndex:
         kinds = read_kinds()
         asked = self._words.ask(request)
         ratios = self._words.score_ratios(asked, WHOLE_WORD_WEIGHTS, size=len(kinds))
-        is_absent = [not self._n_known.get(kind) for kind in kinds]
-        number = int(np.where(is_absent, ratios, 0.0).argmax())
+        number = int(np.where(self._find_absent(), ratios, 0.0).argmax())
         return (kinds[number].names[0], float(ratios[number])) if ratios[number] > 0 else None
 
     def find_missing_called(self, request: str) -> tuple[str, float] | None:
         """Find the kind that a request names and nothing else, if it is not remembered."""
         stems = content_stems(request)
-        is_absent = dict(zip(self._kinds, self._find_absent().tolist(), strict=True))
-        called = (kind for kind in find_kinds_called(request) if is_absent[kind])
+        called = (kind for kind in find_kinds_called(request) if not self._n_known.get(kind))
         names = (name for kind in called for name in kind.names if content_stems(name) == stems)
         return next(((name, 1.0) for name in names), None)
 
@@ -292,7 +290,7 @@ class KindIndex:
             for label, own in zip(some, ratios, strict=True):
                 number = int(own.argmax())
                 if own[number] >= _SAME_KIND_RATIO:
-                    self._kinds_of[label] = (self._kinds[number],)
+                    self._kinds_of[label] = (read_kinds()[self._numbers[number]],)
 
 
 def _texts_of(kind: ThingKind) -> Texts:

@@ -53,11 +53,13 @@ def names_no_less(label: str, asked: str) -> bool:
 
     "charger 2" and "red charger" do for "chargers"; "charger" does for neither of them.
     """
+    if not name_the_same(label, asked):
+        return False
     words, known = (
         tuple(map(_singular, _TOKEN.findall(without_accents(each)))) for each in (asked, label)
     )
     is_kind = not set(find_kinds_called(" ".join(words))).isdisjoint(_parts_of(label).kinds)
-    return name_the_same(label, asked) and (is_kind or set(words) <= set(known))
+    return is_kind or set(words) <= set(known)
 
 
 @lru_cache(maxsize=MOST_KEPT)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import chain
 from typing import Self
 
 from pydantic import Field
@@ -23,7 +22,7 @@ from mapspeak.server.text.recall import say_places_left
 from mapspeak.server.text.wording import list_some, say_pose, say_pose_doubt
 from mapspeak.server.text.world.drives import say_end
 from mapspeak.server.text.world.notices import say_elsewhere, say_off
-from mapspeak.worldmodel.remembered import RememberedPlace, number_places
+from mapspeak.worldmodel.remembered import RememberedPlace, find_place_id, number_places
 
 MOST_NAMED = 12
 MOST_PLACES = 20
@@ -341,12 +340,9 @@ class WriteAnswer(Report):
         warnings: Sequence[str] = (),
     ) -> Self:
         """Make the report of a write, with the id that the place has in the memory now."""
-        places, waypoint = number_places(memory.waypoints), receipt.waypoint
-        # To compare names letter by letter is much faster than by their keys.
-        stored = (place for place in places if place.waypoint.name == waypoint.name)
-        alike = (place for place in places if _is_called(place, waypoint.name))
+        waypoint = receipt.waypoint
         return cls(
-            id=next(chain(stored, alike)).id,
+            id=find_place_id(memory.waypoints, waypoint.name),
             seen_from=f"{say_pose(waypoint.pose)}, in {waypoint.room_id or 'no room'}",
             is_new=receipt.previous is None,
             replaced="; ".join(say_replaced(receipt.previous, merge.waypoint)),

@@ -67,9 +67,10 @@ def say_reported(
     if found := find_reported(world, query, meant):
         return _say_places(world, found, now)
     try:
-        known = _leave_out(store.list_labels())
-        if earlier := world.recollector.reports.index.find_meant(query.words, known):
-            return _say_pictures(world, find, query, earlier, now)
+        known = store.list_labels()
+        earlier = world.recollector.reports.index.find_meant(query.words, known)
+        if shown := _leave_out(earlier):
+            return _say_pictures(world, find, query, shown, now)
     except SemanticMapError:
         # What cannot be read costs no answer about what is remembered.
         return ""
