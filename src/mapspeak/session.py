@@ -119,6 +119,7 @@ class Session:
         wall_clock = None if guard is None else guard.wall_clock
         self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
         self.recollector = Recollector(find_model, kept=folder)
+        memory.kept = self.recollector
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._revising = anyio.Lock()
         self.keeper, self._lease = self.memory.keeper, Lease(lease_s)

@@ -10,10 +10,15 @@ from drawing import grid_from_text
 from embedding import ConceptEmbedder
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, LaserFan, SemanticMap, Waypoint
-from mapspeak.memory.things.finding import Things
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.keptvalues import PlainReader, load_value
-from mapspeak.worldmodel.recollection import INDEX_FILE, KEPT_FROM, THINGS_FILE, Recollector
+from mapspeak.worldmodel.recollection import (
+    INDEX_FILE,
+    KEPT_FROM,
+    THINGS_FILE,
+    KeptMemory,
+    Recollector,
+)
 
 HALL = """
     ####################
@@ -60,14 +65,14 @@ def _keep(folder: Path, memory: SemanticMap) -> Recollector:
 
 def test_a_later_session_takes_the_things_that_were_kept(tmp_path: Path) -> None:
     first = _keep(tmp_path, _remember()).latest
-    kept = load_value(tmp_path / THINGS_FILE, Things)
+    kept = load_value(tmp_path / THINGS_FILE, KeptMemory)
 
     later = Recollector(kept=tmp_path)
     again = later.recollect(_remember(), _draw())
 
     assert first is not None
     assert kept is not None
-    assert kept.things == again.found.things == first.found.things
+    assert kept.found.things == again.found.things == first.found.things
     written = (tmp_path / THINGS_FILE).stat().st_mtime_ns
     later.keep_things()
     assert (tmp_path / THINGS_FILE).stat().st_mtime_ns == written
@@ -154,7 +159,7 @@ def test_a_file_that_is_cut_off_is_passed_over(n_kept: int, tmp_path: Path) -> N
     _keep(tmp_path, _remember())
     path = tmp_path / THINGS_FILE
     path.write_bytes(path.read_bytes()[:n_kept])
-    assert load_value(path, Things) is None
+    assert load_value(path, KeptMemory) is None
     assert len(Recollector(kept=tmp_path).recollect(_remember(), _draw()).things) > 0
 
 
@@ -165,9 +170,9 @@ def test_a_file_of_other_code_or_with_a_flaw_is_passed_over(tmp_path: Path) -> N
     begin = content.index(pickle.PROTO + b"\x05")
     for at in (0, begin + 50):
         path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
-        assert load_value(path, Things) is None
+        assert load_value(path, KeptMemory) is None
     path.write_bytes(content)
-    assert load_value(path, Things) is not None
+    assert load_value(path, KeptMemory) is not None
 
 
 @pytest.mark.parametrize("name", ["os.system", "mapspeak.cli.main", "builtins.eval"])

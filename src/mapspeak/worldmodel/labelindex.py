@@ -49,6 +49,6 @@ class LabelIndex:
         new = [each for each in labels if each not in self._entries]
         if new:
             added = (Entry(id=each, kind=EntryKind.THING, name=each) for each in new)
-            self._entries |= {each.id: each for each in added}
-            self._index.hold(tuple(self._entries.values()))
+            self._entries = self._entries | {each.id: each for each in added}
+            self._index.hold(self._entries)
         return self._index

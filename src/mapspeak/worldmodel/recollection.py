@@ -7,6 +7,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,7 @@ from mapspeak.memory.consistency.unseen import UnseenThings, find_near
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.meaningindex import Embedder, TextVectors
+from mapspeak.memory.store.reading import Contents
 from mapspeak.memory.things.finding import Things, find_things
 from mapspeak.memory.things.thing import Category
 from mapspeak.spatial import OccupancyGrid
@@ -57,7 +59,7 @@ class Search:
         self._kept = kept
         self._lock = threading.Lock()
         self._index: EntryIndex | None = None
-        self._entries: dict[Remembered, Entry] = {}
+        self._said: dict[Remembered, Entry] = {}
 
     @contextmanager
     def holding(self, recollection: "Recollection") -> Iterator[EntryIndex]:
@@ -83,15 +85,15 @@ class Search:
                 keep_value(self._kept, self._index)
                 self._index.n_new = 0
 
-    def list_entries(self, recollection: "Recollection") -> tuple[Entry, ...]:
-        """Return what is said of places and things; what is known of the same ones stays."""
-        known = self._entries
-        entries = {
-            each: known.get(each) or recollection.describe(each)
-            for each in recollection.by_id.values()
+    def list_entries(self, recollection: "Recollection") -> Mapping[str, Entry]:
+        """Return what is said of places and things by their ids; of the same ones it stays."""
+        everything = recollection.by_id.values()
+        known = map(self._said.get, everything)
+        self._said = {
+            each: said or recollection.describe(each)
+            for each, said in zip(everything, known, strict=True)
         }
-        self._entries = entries
-        return tuple(entries.values())
+        return dict(zip(recollection.by_id, self._said.values(), strict=True))
 
 
 class Recollection:
@@ -185,8 +187,8 @@ class Recollection:
         return {place.waypoint.name: place for place in self.places}
 
     @cached_property
-    def entries(self) -> tuple[Entry, ...]:
-        """What is said of places and things."""
+    def entries(self) -> Mapping[str, Entry]:
+        """What is said of places and things, by their ids."""
         return self._search.list_entries(self)
 
     def describe(self, each: Remembered) -> Entry:
@@ -227,6 +229,18 @@ class Judge:
         return Trust(ratio, tuple(against))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KeptMemory:
+    """What is kept of a memory for a later session.
+
+    Attributes:
+        contents: The records as they were parsed: the very ones that things were joined of.
+    """
+
+    contents: Contents
+    found: Things
+
+
 class Recollector:
     """Keeps what was made of a memory and a map until one of them changes.
 
@@ -248,7 +262,9 @@ class Recollector:
         # Held while the model is loaded, by the first question or ahead of it.
         self._loading = threading.RLock()
         self._latest: Recollection | None = None
-        self._n_joined = 0
+        self._n_new = 0
+        self._earlier: KeptMemory | None = None
+        self._contents = Contents()
         self._search = Search(self._find_vectors, kept=kept and kept / INDEX_FILE)
         self.reports = ReportJoiner()
 
@@ -317,25 +333,45 @@ class Recollector:
         found: TextVectors | None = self.__dict__.get("_vectors")
         return found
 
+    def load_records(self) -> Contents | None:
+        """Return the records that were kept with the things; they are read only once."""
+        path = self._kept and self._kept / THINGS_FILE
+        self._earlier = None if path is None else load_value(path, KeptMemory)
+        if self._earlier is None:
+            return None
+        self._contents = self._earlier.contents
+        return self._contents
+
+    def keep_records(self, contents: Contents) -> None:
+        """Keep these records with the things, once there are any."""
+        with self._lock:
+            self._contents = contents
+            self._n_new += KEPT_FROM
+
     def keep_things(self) -> None:
         """Write the things and their index if most of the work would be done again."""
         self._search.keep()
         with self._lock:
-            latest, n_joined = self._latest, self._n_joined
-        if self._kept is not None and latest is not None and n_joined >= KEPT_FROM:
-            keep_value(self._kept / THINGS_FILE, latest.found)
-            self._n_joined -= n_joined
+            latest, n_new = self._latest, self._n_new
+        if self._kept is not None and latest is not None and n_new >= KEPT_FROM:
+            kept = KeptMemory(contents=self._contents, found=latest.found)
+            keep_value(self._kept / THINGS_FILE, kept)
+            self._n_new -= n_new
 
-    def _load_things(self, memory: SemanticMap) -> Things | None:
-        is_large = sum(len(place.landmarks) for place in memory.waypoints) >= KEPT_FROM
-        return load_value(self._kept / THINGS_FILE, Things) if self._kept and is_large else None
+    def _take_kept(self, memory: SemanticMap) -> Things | None:
+        if sum(len(place.landmarks) for place in memory.waypoints) < KEPT_FROM:
+            return None
+        if self._earlier is None:
+            self.load_records()
+        earlier, self._earlier = self._earlier, None
+        return None if earlier is None else earlier.found
 
     def _make(
         self, memory: SemanticMap, grid: OccupancyGrid, earlier: Recollection | None
     ) -> Recollection:
-        known = earlier.found if earlier else self._load_things(memory)
+        known = earlier.found if earlier else self._take_kept(memory)
         found = find_things(memory, grid, earlier=known)
-        self._n_joined += found.n_joined
+        self._n_new += found.n_joined
         things, n_named = number_things(
             found.things,
             () if earlier is None else earlier.things,

@@ -88,28 +88,26 @@ def number_things(
     """
     # By identity first: that is most of them, and to compare them as values is slow.
     present, known = set(map(id, things)), {id(each.thing) for each in earlier}
-    kept = [each for each in earlier if id(each.thing) in present]
-    same = {each.thing: each for each in earlier if id(each.thing) not in present}
-    ids: dict[int, RememberedThing] = {}
-    new = [number for number, thing in enumerate(things) if id(thing) not in known]
-    for number in new:
-        if things[number] in same:
-            ids[number] = replace(same.pop(things[number]), thing=things[number])
-    new = [number for number in new if number not in ids]
-    gone = list(same.values())
+    left = {each.thing: each for each in earlier if id(each.thing) not in present}
+    new = [thing for thing in things if id(thing) not in known]
+    named: dict[str, RememberedThing | None] = {each.id: each for each in earlier}
+    if left:
+        same = {id(thing): left.pop(thing) for thing in new if thing in left}
+        named |= {same[id(t)].id: replace(same[id(t)], thing=t) for t in new if id(t) in same}
+        new = [thing for thing in new if id(thing) not in same]
+    named |= dict.fromkeys(each.id for each in left.values())
     seen_better = match_best_first(
         ((rank, number), each.id, number)
-        for number in new
-        for each in gone
-        if (rank := _sameness(things[number], each.thing)) is not None
+        for number, thing in enumerate(new)
+        for each in left.values()
+        if (rank := _sameness(thing, each.thing)) is not None
     )
-    for number, thing_id in seen_better.items():
-        ids[number] = RememberedThing(id=thing_id, thing=things[number])
-    for number in new:
-        if number not in ids:
+    for number, thing in enumerate(new):
+        if number not in seen_better:
             n_named += 1
-            ids[number] = RememberedThing(id=f"T{n_named}", thing=things[number])
-    return tuple(sorted((*kept, *ids.values()), key=lambda each: int(each.id[1:]))), n_named
+        id_ = seen_better.get(number, f"T{n_named}")
+        named[id_] = RememberedThing(id=id_, thing=thing)
+    return tuple(each for each in named.values() if each is not None), n_named
 
 
 def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:

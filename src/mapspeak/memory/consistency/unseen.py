@@ -1,10 +1,10 @@
 """Looks that should have shown a thing and did not, and things that stand elsewhere since."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import datetime
 from functools import cached_property
-from itertools import chain, islice, zip_longest
+from itertools import chain, count, islice, repeat, zip_longest
 
 import numpy as np
 
@@ -48,36 +48,49 @@ class UnseenThings:
         self.looks = {each.name: each for each in places.waypoints}
         self.found = found
         self.placed = [thing for thing in found.things if thing.position is not None]
-        self.numbers = {id(thing): number for number, thing in enumerate(self.placed)}
-        self.at = self._place(earlier)
+        self.numbers = dict(zip(map(id, self.placed), count(), strict=False))
+        known = {} if earlier is None else earlier.numbers
+        came_from = np.fromiter(map(known.get, self.numbers, repeat(-1)), np.intp)
+        self.at = self._place(earlier, came_from)
         self._looks_at = np.full((len(self._waypoints), 5), np.nan)
         before = () if earlier is None else earlier._waypoints  # noqa: SLF001 - of this class
         if earlier is not None:
             self._looks_at[: len(before)] = earlier._looks_at[: len(self._waypoints)]  # noqa: SLF001
+        others = list[Waypoint]()
         for i, (look, then) in enumerate(zip_longest(self._waypoints, before)):
-            if look is not None and look is not then:
-                self._looks_at[i] = look.pose.x, look.pose.y, look.pose.yaw_rad, np.nan, np.nan
+            if look is not then:
+                others += filter(None, (look, then))
+                if look is not None:
+                    pose = look.pose
+                    self._looks_at[i] = pose.x, pose.y, pose.yaw_rad, np.nan, np.nan
         self.known: dict[int, tuple[MemoryFinding, ...]] = {}
         if earlier is not None and earlier.known:
-            self._take_over(earlier)
+            self._take_over(earlier, came_from, others)
 
-    def _place(self, earlier: "UnseenThings | None") -> FloatArray:
+    def _place(self, earlier: "UnseenThings | None", came_from: IntArray) -> FloatArray:
         """Return where the things are; what is known of the very same ones is taken over."""
         at = np.empty((len(self.placed), 2))
-        known = {} if earlier is None else earlier.numbers
-        numbers = np.array([known.get(each, -1) for each in self.numbers], dtype=np.intp)
         if earlier is not None:
-            at[numbers >= 0] = earlier.at[numbers[numbers >= 0]]
-        for number in np.flatnonzero(numbers < 0).tolist():
+            at[came_from >= 0] = earlier.at[came_from[came_from >= 0]]
+        for number in np.flatnonzero(came_from < 0).tolist():
             position = self.placed[number].position
             assert position is not None  # noqa: S101 - those without one are not placed
             at[number] = position.x, position.y
         return at
 
-    def _take_over(self, earlier: "UnseenThings") -> None:
-        new = [self.placed[n] for each, n in self.numbers.items() if each not in earlier.numbers]
-        gone = (n for each, n in earlier.numbers.items() if each not in self.numbers)
-        changed = [earlier.placed[n] for n in gone] + new
+    def _take_over(
+        self, earlier: "UnseenThings", came_from: IntArray, others: Iterable[Waypoint]
+    ) -> None:
+        """Take over what depends on no changed look or thing.
+
+        Args:
+            came_from: The number of each thing among the earlier ones; -1 for a new one.
+            others: The looks, of then and of now, that are not the very same.
+        """
+        new = [self.placed[number] for number in np.flatnonzero(came_from < 0).tolist()]
+        is_gone = np.ones(len(earlier.placed), dtype=np.bool_)
+        is_gone[came_from[came_from >= 0]] = False
+        changed = [earlier.placed[number] for number in np.flatnonzero(is_gone).tolist()] + new
         names = {name for thing in changed for name in thing.waypoints}
         before = {name: earlier.seen_from.get(name, ()) for name in names}
         seen_from = {
@@ -91,8 +104,6 @@ class UnseenThings:
             things.sort(key=lambda each: self.numbers[id(each)])
         self.seen_from = earlier.seen_from | seen_from
         looks, looked = self.looks, earlier.looks
-        very_same = set(map(id, looks.values())) & set(map(id, looked.values()))
-        others = (each for each in (*looks.values(), *looked.values()) if id(each) not in very_same)
         names.update(each.name for each in others if looks.get(each.name) != looked.get(each.name))
         is_stale = np.zeros(len(self.placed), dtype=np.bool_)
         for look in filter(None, (each.get(name) for each in (looks, looked) for name in names)):

@@ -8,7 +8,7 @@ remembered at all, are chances fitted to requests.
 
 import math
 import re
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import chain, count
@@ -115,8 +115,7 @@ class EntryIndex:
         self.n_new = 0
         self._entries: dict[int, Entry] = {}
         self._number_of: dict[str, int] = {}
-        self._latest: Sequence[Entry] | None = None
-        self._held: dict[int, Entry] = {}
+        self._held: Mapping[str, Entry] = {}
         self.vectors = vectors
         self._kinds = KindIndex(vectors)
         self._words = WordIndex()
@@ -126,30 +125,35 @@ class EntryIndex:
         self._thresholds = WORD_THRESHOLDS if vectors is None else vectors.embedder.thresholds
         self._of_key, self._of_letters, self._of_other = (Numbers() for _ in range(3))
         self._look_alikes: LookAlikes | None = None
-        self.hold(entries)
+        self.hold({each.id: each for each in entries})
 
-    def hold(self, entries: Sequence[Entry]) -> None:
-        """Hold exactly these entries; those that it has cost next to nothing."""
-        if entries is self._latest:
+    def hold(self, entries: Mapping[str, Entry]) -> None:
+        """Hold exactly these entries, each under its id; those that it has cost next to nothing."""
+        held, self._held = self._held, entries
+        if entries is held:
             return
         # By identity: most are the very same each time, and to compare them as values is slow.
-        held = self._held or {id(each): each for each in self._entries.values()}
-        now = {id(each): each for each in entries}
+        changed = {id_: each for id_, each in entries.items() if held.get(id_) is not each}
         gone: dict[tuple[object, ...], list[int]] = {}
-        for entry in (each for key, each in held.items() if key not in now):
-            gone.setdefault(_CONTENT(entry), []).append(self._number_of.pop(entry.id))
+        for id_, before in held.items():
+            if (now := entries.get(id_)) is before:
+                continue
+            if now == before:
+                # The same, made again.
+                self._entries[self._number_of[id_]] = changed.pop(id_)
+            else:
+                gone.setdefault(_CONTENT(before), []).append(self._number_of.pop(id_))
         new = []
-        for entry in (each for key, each in now.items() if key not in held):
+        for id_, entry in changed.items():
             if numbers := gone.get(_CONTENT(entry)):
-                # The same, made again or under another id.
+                # The same under another id.
                 number = numbers.pop()
-                self._entries[number], self._number_of[entry.id] = entry, number
+                self._entries[number], self._number_of[id_] = entry, number
             else:
                 new.append(entry)
         for number in chain.from_iterable(gone.values()):
             self._remove(number)
         self._add(new)
-        self._latest, self._held = entries, now
 
     def _add(self, entries: Sequence[Entry]) -> None:
         self._kinds.add(entries)
@@ -191,7 +195,7 @@ class EntryIndex:
 
     def __getstate__(self) -> dict[str, object]:
         """Return what is kept on the disk: all but what holds in this process alone."""
-        return self.__dict__ | {"_latest": None, "_held": {}, "_look_alikes": None, "n_new": 0}
+        return self.__dict__ | {"_look_alikes": None, "n_new": 0}
 
     def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
         """Find what a request may mean.

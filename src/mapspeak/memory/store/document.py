@@ -234,9 +234,7 @@ def _ended(text: str) -> str:
     return text if not text or text.endswith("\n") else text + "\n"
 
 
-def parse_document(
-    content: bytes, *, source: str, previous: MapDocument | None = None
-) -> MapDocument:
+def parse_document(content: bytes, *, source: str, previous: Contents | None = None) -> MapDocument:
     """Read a semantic map file.
 
     Args:

@@ -12,6 +12,7 @@ from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames, MapFrame
 from mapspeak.memory.merging import Merge, merge_waypoint
 from mapspeak.memory.quoting import clean_line, name_key, quote_name
+from mapspeak.memory.store.reading import KeptContents
 from mapspeak.memory.walls import KeptWalls
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
@@ -70,12 +71,16 @@ class MemoryStore(ABC):
             observations lie.
         walls: The walls of its frames.
         map_id: The map that the robot is on. None takes the memory for what it says it is.
+
+    Attributes:
+        kept: Keeps parsed records for a later session; None keeps nothing.
     """
 
     def __init__(self, *, path: Path, walls: KeptWalls, map_id: str | None) -> None:
         self.path = path
         self.walls = walls
         self.map_id = clean_line(map_id or "") or None
+        self.kept: KeptContents | None = None
 
     @abstractmethod
     def read(self) -> SemanticMap:

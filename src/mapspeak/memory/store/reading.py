@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
-from typing import cast
+from typing import Protocol, cast
 
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
@@ -62,6 +62,16 @@ class Contents:
     root: Mapping[str, Data] = field(default_factory=dict)
     map_id: str | None = None
     warnings: tuple[str, ...] = ()
+
+
+class KeptContents(Protocol):
+    """Records that were parsed in an earlier session: they only save parsing the same texts."""
+
+    def load_records(self) -> Contents | None:
+        """Return them; None where none are kept that can be read."""
+
+    def keep_records(self, contents: Contents) -> None:
+        """Keep them for a later session; a failure costs only time."""
 
 
 def read_contents(text: str, previous: Contents) -> Contents:

@@ -7,6 +7,7 @@ but what it read last.
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -16,11 +17,16 @@ from mapspeak.memory.events import Event
 from mapspeak.memory.frames import Frames
 from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.memorystore import MemoryStore, OneRecord, Records, Result
+from mapspeak.memory.store.reading import Contents
 from mapspeak.memory.store.records import key_of, list_key_of
 from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 LOCK_TIMEOUT_S = 5.0
+KEPT_FROM = 1000
+"""Records are kept once so many were parsed anew: fewer are parsed in a moment."""
+LEAST_BYTES = 40
+"""No record is shorter."""
 
 _N_TRIES = 5
 """Retries of a write while an editor saves the file at the same moment."""
@@ -124,12 +130,25 @@ class SemanticMapStore(MemoryStore):
             # Not kept: a permission can change while the file does not.
             return _Seen(fingerprint=None, document=last, fault=fault)
         try:
-            document = parse_document(content, source=str(self.path), previous=last)
+            document = self._parse(content, last)
             seen = _Seen(fingerprint=fingerprint, document=document, fault=None)
         except SemanticMapError as fault:
             seen = _Seen(fingerprint=fingerprint, document=last, fault=fault)
         self._seen = seen
         return seen
+
+    def _parse(self, content: bytes, last: MapDocument | None) -> MapDocument:
+        parse = partial(parse_document, content, source=str(self.path))
+        if last is not None or self.kept is None or len(content) < KEPT_FROM * LEAST_BYTES:
+            return parse(previous=last)
+        kept = self.kept.load_records() or Contents()
+        document = parse(previous=kept)
+        of_kept, of_file = (
+            set(map(id, each.lists["waypoints"].values())) for each in (kept, document)
+        )
+        if len(of_file - of_kept) >= KEPT_FROM:
+            self.kept.keep_records(Contents(lists=document.lists, map_id=document.map_id))
+        return document
 
 
 class _FileRecords:
