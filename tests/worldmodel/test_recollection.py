@@ -9,7 +9,7 @@ import pytest
 from drawing import grid_from_text
 from embedding import ConceptEmbedder
 from mapspeak.geometry import Pose
-from mapspeak.memory import Landmark, LaserFan, SemanticMap, Waypoint
+from mapspeak.memory import Landmark, LaserFan, SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.keptvalues import PlainReader, load_value
 from mapspeak.worldmodel.recollection import (
@@ -88,6 +88,26 @@ def test_what_was_made_of_kept_things_serves_the_next_question_too(tmp_path: Pat
     assert all(made.found.seen[place.name][0].of is place for place in memory.waypoints), (
         "later questions compare records by identity"
     )
+
+
+def test_a_later_session_parses_only_the_records_that_changed(tmp_path: Path) -> None:
+    path, folder = tmp_path / "places.yaml", tmp_path / "kept"
+    SemanticMapStore(path).write_all(lambda _: _remember().waypoints)
+    folder.mkdir()
+    for _ in ("the first session", "a later one"):
+        store, recollector = SemanticMapStore(path), Recollector(kept=folder)
+        store.kept = recollector
+        memory = store.read()
+        found = recollector.recollect(memory, _draw()).found
+        recollector.keep_things()
+    made_of = (found.seen[place.name][0].sightings[0].waypoint for place in memory.waypoints)
+    assert all(each is place for each, place in zip(made_of, memory.waypoints, strict=True))
+
+    path.write_text(path.read_text().replace("sink 7", "basin 7"))
+    store = SemanticMapStore(path)
+    store.kept = Recollector(kept=folder)
+    assert store.read().waypoints[7].landmarks[0].label == "basin 7"
+    assert store.read().waypoints[8] == memory.waypoints[8]
 
 
 def test_what_changed_since_is_joined_anew(tmp_path: Path) -> None:

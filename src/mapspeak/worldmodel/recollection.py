@@ -8,15 +8,12 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
-from mapspeak.memory.consistency.checking import MemoryCheck
-from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
 from mapspeak.memory.consistency.unseen import UnseenThings, find_near
 from mapspeak.memory.search.answer import Answer, Entry, EntryKind, list_entries
 from mapspeak.memory.search.index import EntryIndex
@@ -196,37 +193,6 @@ class Recollection:
         if isinstance(each, RememberedPlace):
             return _place_entry(each)
         return _thing_entry(each, self._by_name)
-
-
-class Judge:
-    """Says how far each remembered place and thing may be trusted.
-
-    Args:
-        check: Finds what speaks against them.
-    """
-
-    def __init__(self, check: MemoryCheck) -> None:
-        self._check = check
-
-    @property
-    def findings(self) -> tuple[MemoryFinding, ...]:
-        """All that is odd about the memory."""
-        return self._check.findings
-
-    def judge_thing(self, remembered: RememberedThing, *, now: datetime | None) -> Trust:
-        """Return the trust that a thing deserves at a moment; without one its age is no matter."""
-        thing = remembered.thing
-        against = () if remembered.is_reported else self._check.find_of_thing(thing)
-        return judge_trust(thing, against, now=now)
-
-    def judge_place(self, place: RememberedPlace) -> Trust:
-        """Return the trust that a record deserves: it is sure until something speaks against it."""
-        ratio, against = 1.0, []
-        for finding in self._check.find_of_place(place.waypoint):
-            if finding.label is None and finding.weight < 1.0:
-                ratio *= finding.weight
-                against.append(finding)
-        return Trust(ratio, tuple(against))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

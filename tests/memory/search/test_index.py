@@ -431,7 +431,7 @@ def test_an_entry_under_another_id_is_not_indexed_anew() -> None:
     moved = [replace(each, id=f"{each.id} 2") for each in ENTRIES]
     n_new, n_asked = index.n_new, len(embedder.asked)
 
-    index.hold(moved[1:])
+    index.hold({each.id: each for each in moved[1:]})
 
     assert (index.n_new, len(embedder.asked)) == (n_new, n_asked)
     for each in ENTRIES:
@@ -504,7 +504,7 @@ def test_after_any_changes_an_index_answers_as_one_made_from_nothing(
 ) -> None:
     index = EntryIndex(vectors=vectors_of(embedder))
     for entries in states:
-        index.hold(entries)
+        index.hold({each.id: each for each in entries})
         fresh = EntryIndex(entries, vectors=vectors_of(embedder))
         assert index.find(query) == fresh.find(query)
         assert index.find_called(query) == fresh.find_called(query)

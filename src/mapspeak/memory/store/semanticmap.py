@@ -23,7 +23,7 @@ from mapspeak.memory.walls import WallFolder
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 LOCK_TIMEOUT_S = 5.0
-KEPT_FROM = 1000
+KEPT_FROM = 500
 """Records are kept once so many were parsed anew: fewer are parsed in a moment."""
 LEAST_BYTES = 40
 """No record is shorter."""

@@ -93,19 +93,14 @@ class Things:
     def find_sight_ratios(self, looks: Sequence[Waypoint], points: FloatArray) -> FloatArray:
         """Return how likely each waypoint (row) has each point in sight: less over furniture."""
         seen = [self._surroundings(each) for each in looks]
-        at = np.array([(each.pose.x, each.pose.y) for each in seen]).reshape(-1, 2, 1)
-        ways = points.T - at
+        ways = points.T - np.array([[[e.pose.x], [e.pose.y]] for e in seen]).reshape(-1, 2, 1)
         far_m = np.hypot(ways[:, 0], ways[:, 1])
-        yaw_rad = self.sight.grid.origin.yaw_rad
-        rays = bearing_index(np.arctan2(ways[:, 1], ways[:, 0]) - yaw_rad)
+        ahead = np.arctan2(ways[:, 1], ways[:, 0])
+        rays = bearing_index(ahead - self.sight.grid.origin.yaw_rad)
         # A thing is wider than a ray, so that its edge shows where a corner hides its middle.
-        is_near, is_far = (
-            far_m <= np.take_along_axis(find_farthest_beside(met_m), rays, axis=1) + SURFACE_M
-            for met_m in (
-                np.array([each.near_m for each in seen]).reshape(-1, N_RAYS),
-                np.array([each.far_m for each in seen]).reshape(-1, N_RAYS),
-            )
-        )
+        met_m = np.array([(each.near_m, each.far_m) for each in seen]).reshape(-1, 2, N_RAYS)
+        beside_m = np.take_along_axis(find_farthest_beside(met_m), rays[:, None], axis=2)
+        is_near, is_far = (far_m[:, None] <= beside_m + SURFACE_M).transpose(1, 0, 2)
         return np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
 
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
