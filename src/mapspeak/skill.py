@@ -146,12 +146,7 @@ def failed(code: SkillCode = SkillCode.NOT_ACHIEVED, quote: str = "") -> SkillOu
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillProgress:
-    """The progress of a running skill.
-
-    Attributes:
-        values: The latest feedback, by name.
-        account: The steps that a mission has done so far.
-    """
+    """The progress of a running skill: its latest feedback, and a mission's steps so far."""
 
     values: Arguments = field(default_factory=dict)
     account: tuple[str, ...] = ()

@@ -132,11 +132,7 @@ def _check_given(spec: SkillSpec, given: Arguments, *, what: str) -> None:
 
 
 def needs_word(spec: SkillSpec, bounds: MissionBounds, kinds: Collection[CommandKind]) -> bool:
-    """Return True where any part of a mission would need a person's word by itself.
-
-    Args:
-        kinds: Those that the policy wants a word for.
-    """
+    """Return True where any part of a mission is of the kinds that need a person's word."""
     asks_to_drive = bounds.n_drives > 0 and CommandKind.DRIVE in kinds
     asks_for_more = bounds.n_commands > 0 and any(each is not CommandKind.DRIVE for each in kinds)
     return spec.is_always_asked or bool(bounds.asked) or asks_to_drive or asks_for_more

@@ -52,11 +52,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class MessageLayout:
-    """A message type as the parameters of a skill; `build_layout` makes one.
-
-    Attributes:
-        slots: The parameters by where in the message their values belong, in the fields' order.
-    """
+    """A message type as the parameters of a skill, by where in the message their values belong."""
 
     slots: Mapping[tuple[str, ...], SkillParameter]
 

@@ -26,7 +26,6 @@ class Interrupted:
 
     Attributes:
         begun: ISO 8601, by the operator's clock.
-        steps: The steps it had done.
     """
 
     name: str

@@ -209,11 +209,8 @@ class MissionDesk:
 
     Attributes:
         find_skill: Raises `SkillError` for a name that it does not know.
-        gate: Lets a mission begin, and ends it in time.
-        record: On disk.
         present: Marks a client as present: a mission needs no client while it runs.
         begins: Called as a mission begins.
-        latest: The latest mission; None before the first.
     """
 
     find_skill: FindSkill
@@ -232,10 +229,7 @@ class MissionDesk:
         return MissionCheck(self.find_skill).find_bounds(mission)
 
     def open(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
-        """Return the mission that is written in an entry.
-
-        Args:
-            path: The file that it is saved in.
+        """Return the mission that is written in an entry, or saved in a file.
 
         Raises:
             SkillError: Its tree has a mistake.

@@ -226,11 +226,7 @@ class SkillRun:
             self._tell()
 
     async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
-        """Return at its end, at a question, or when the time is over; report progress meanwhile.
-
-        Args:
-            wait_s: Wall time.
-        """
+        """Return at its end, at a question, or after some wall time; report progress meanwhile."""
         with anyio.move_on_after(wait_s):
             while not self.is_over and not self.is_asking:
                 news, n_before = self._news, self.n_progress

@@ -153,11 +153,7 @@ class Exposure:
         }
 
     async def _fetch(self, called: Called, name: str, kind: str) -> list[Interface]:
-        """Return an action or a service; or whether a topic is read or published on, by its ends.
-
-        Args:
-            kind: The type of a topic, which the robot's graph tells.
-        """
+        """Return an action or a service; or what a topic of a type is for, by its ends."""
         inquiry = self.ros.inquiry
         match called:
             case Called.ACTION:

@@ -87,11 +87,7 @@ OUTCOMES = {
 
 @dataclass(frozen=True, slots=True)
 class _Opened:
-    """An interface with its type, ready to be used.
-
-    Attributes:
-        sent: What it takes.
-    """
+    """An interface with its type and what it takes, ready to be used."""
 
     interface: Interface
     ros: RosAccess
