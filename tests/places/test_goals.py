@@ -32,6 +32,26 @@ def check(goal: Pose, *, text: str = FLAT, origin: Pose | None = None) -> GoalCh
     return check_goal(grid, distances_from(grid, robot, radius_m=RADIUS_M), goal)
 
 
+TABLE = """
+    ????????????????
+    ?##############?
+    ?#............#?
+    ?#..####......#?
+    ?#..#??#...##.#?
+    ?#..#??#...#?.#?
+    ?#..####...##.#?
+    ?#............#?
+    ?##############?
+    ????????????????
+    """
+
+
+def test_the_unseen_inside_of_a_table_is_an_obstacle_and_no_space_to_explore() -> None:
+    assert check(Pose(2.75, 2.75), text=TABLE).verdict is GoalVerdict.OCCUPIED
+    assert check(Pose(6.25, 2.25), text=TABLE).verdict is GoalVerdict.UNKNOWN
+    assert check(Pose(0.25, 2.25), text=TABLE).verdict is GoalVerdict.UNKNOWN
+
+
 def test_a_goal_in_the_open_is_fine_and_says_how_far_it_is() -> None:
     found = check(Pose(4.75, 2.75, 1.0))
     assert found.is_ok

@@ -145,10 +145,20 @@ async def test_a_drive_that_takes_longer_is_waited_for_by_asking_again(tmp_path:
     robot = FakeRobot(two_rooms())
     async with connect(robot, tmp_path) as client:
         result = await client.call_tool("look_at", {"place": "R2", "wait_s": 0.5})
-        assert "No picture yet: G1 to a view of R2 is driving." in text_of(result)
+        assert "No picture yet: G1 to a view of R2 is driving" in text_of(result)
         assert not pictures_of(result)
         result = await client.call_tool("look_at", {"place": "R2"})
     assert len(pictures_of(result)) == 1
+
+
+async def test_who_waits_for_a_view_is_told_how_far_it_is_and_how_long_it_takes(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        told = text_of(await client.call_tool("look_at", {"place": "R1", "wait_s": 1.0}))
+    ((left_m, left_s),) = re.findall(r"driving, ([\d.]+) m left, about (\d+) s at its pace", told)
+    assert float(left_m) > 0.3
+    assert int(left_s) == pytest.approx(float(left_m), abs=1.0)
 
 
 async def test_a_drive_that_ends_blocked_gives_no_picture_and_says_why(tmp_path: Path) -> None:

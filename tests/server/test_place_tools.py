@@ -1,8 +1,10 @@
 import math
+import re
 from pathlib import Path
 
 import pytest
 
+from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from served import MODES, connect, report_of, text_of
 
@@ -28,6 +30,63 @@ async def test_a_room_is_described_with_its_size_its_doors_and_the_way_there(
     assert "number 2 of 2 sure rooms, counted from the smallest" in text
     assert "Door D1 to R2: " in text
     assert "navigate_to takes R1" in text
+
+
+THREE_IN_A_ROW = """
+    ################################
+    #.........#..........#.........#
+    #.........#..........#.........#
+    #.........#..........#.........#
+    #..............................#
+    #..............................#
+    #..............................#
+    #..............................#
+    #.........#..........#.........#
+    #.........#..........#.........#
+    #.........#..........#.........#
+    ################################
+    """
+
+
+ALCOVE = """
+    ##########################
+    #.....#..................#
+    #.....#..................#
+    #.....#..................#
+    #........................#
+    #........................#
+    #........................#
+    #........................#
+    #........................#
+    #........................#
+    #........................#
+    #.....#..................#
+    #.....#..................#
+    #.....#..................#
+    ##########################
+    """
+
+
+async def test_that_the_robot_fits_through_the_doors_of_a_room_is_told_once(tmp_path: Path) -> None:
+    robot = FakeRobot(grid_from_text(THREE_IN_A_ROW, resolution_m=0.25))
+    async with connect(robot, tmp_path) as client:
+        here = report_of(await client.call_tool("get_robot_pose", {}))["place"]
+        outer = text_of(await client.call_tool("describe_place", {"place": here}))
+        (middle,) = re.findall(r"Door D\d+ to (R\d+): ", outer)
+        text = text_of(await client.call_tool("describe_place", {"place": middle}))
+    assert len(re.findall(r"^Door D\d+ to R\d+: [\d.]+ m wide, at .*\d\.$", text, re.MULTILINE)) == 2
+    assert text.count("fits with") == outer.count("fits with") == 1
+
+
+async def test_a_room_that_is_probably_part_of_another_is_described_so_as_the_map_does(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(grid_from_text(ALCOVE, resolution_m=0.2))
+    async with connect(robot, tmp_path) as client:
+        drawn = text_of(await client.call_tool("look_at_map", {"full": True}))
+        ((region, part),) = re.findall(r"^(\w+) \| [\d.]+\+? \((\w+ part of .*?)\)", drawn, re.MULTILINE)
+        text = text_of(await client.call_tool("describe_place", {"place": region}))
+    assert text.startswith(f"{region} is a room ({part}):")
 
 
 async def test_a_door_says_whether_the_robot_fits_through(tmp_path: Path) -> None:

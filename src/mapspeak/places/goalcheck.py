@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import cv2
 import numpy as np
 
 from mapspeak.errors import NextStep
@@ -77,6 +78,8 @@ NEAR_M = 1.0
 """How far around a goal an obstacle is looked for first."""
 THICKEST_M = 0.5
 """Unseen space between faces no farther apart is the inside of a wall."""
+LARGEST_M = 1.5
+"""Unseen space with obstacles all around, no farther off than this, is the inside of one."""
 SPARE_M = 0.02
 """Navigation plans with a little more than the radius, and refuses a goal that leaves less."""
 TIGHT_OFF_M = 0.5
@@ -146,7 +149,7 @@ def _judge(
     cell = grid.cell_at(goal.point)
     if not grid.contains(cell):
         return GoalVerdict.OFF_MAP
-    if grid.is_unknown(cell) and not is_in_wall(grid, goal.point):
+    if grid.is_unknown(cell) and not is_in_obstacle(grid, goal.point):
         return GoalVerdict.UNKNOWN
     if not grid.is_free(cell):
         return GoalVerdict.OCCUPIED
@@ -235,15 +238,28 @@ def _into(grid: OccupancyGrid, point: Point) -> Point:
     return grid.point_at(Cell(row, col))
 
 
-def is_in_wall(grid: OccupancyGrid, point: Point) -> bool:
-    """Return True for unseen space with both faces of a wall near, on opposite sides of it."""
+def is_in_obstacle(grid: OccupancyGrid, point: Point) -> bool:
+    """Return True for unseen space between both faces of a wall, or with faces all around it."""
     cell = grid.cell_at(point)
     if not grid.contains(cell) or not grid.is_unknown(cell):
         return False
-    return any(
+    return _is_enclosed(grid, cell) or any(
         _to_face_m(grid, cell, down, across) + _to_face_m(grid, cell, -down, -across) <= THICKEST_M
         for down, across in ((0, 1), (1, 0), (1, 1), (1, -1))
     )
+
+
+def _is_enclosed(grid: OccupancyGrid, cell: Cell) -> bool:
+    """Return True where the unseen cells around one end at obstacles alone, near by."""
+    margin = math.ceil(LARGEST_M / grid.resolution_m)
+    window = grid.window(cell.row, cell.col, margin=margin)
+    near = grid.crop(*window)
+    _, parts = cv2.connectedComponents(near.unknown.astype(np.uint8), connectivity=4)
+    own = parts == parts[cell.row - window[0].start, cell.col - window[1].start]
+    if own[[0, -1]].any() or own[:, [0, -1]].any():
+        return False
+    around = cv2.dilate(own.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
+    return not near.free[around > 0].any()
 
 
 def _to_face_m(grid: OccupancyGrid, cell: Cell, down: int, across: int) -> float:

@@ -301,6 +301,24 @@ async def test_a_mission_that_is_cancelled_leaves_the_robot_standing_and_says_wh
     assert "3 drive: cut off" in told
 
 
+async def test_a_mission_under_way_is_told_without_the_steps_that_were_told(
+    tmp_path: Path,
+) -> None:
+    async with missions(tmp_path) as caller:
+        caller.robot.may_drive = anyio.Event()
+        await caller.ask("run_mission", tree="- note: begun\n- drive: R2\n- note: there\n", wait_s=0)
+        first, again = await caller.ask("skill_status"), await caller.ask("skill_status")
+        caller.robot.may_drive.set()
+        over = await caller.until("succeeded")
+        later = await caller.ask("skill_status")
+    assert "2 note: succeeded" in first
+    assert "2 note: succeeded" not in again
+    assert "besides 2 steps told before" in again
+    assert "2 note: succeeded" in over
+    assert "4 note: succeeded" in over
+    assert later == over
+
+
 async def test_a_drive_of_a_mission_goes_on_when_a_client_without_a_session_hangs_up(
     tmp_path: Path,
 ) -> None:

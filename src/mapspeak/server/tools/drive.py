@@ -51,6 +51,8 @@ Wait = Annotated[
     AT_MOST_LONGEST_WAIT,
 ]
 LEAST_TURN_S = 0.5
+LEAST_WAY_M = 0.1
+"""From a shorter way nobody can tell a pace."""
 MOST_PICTURES = 12
 LOOK_AROUND = "a look around,"
 OVERLAP_RATIO = 1.1
@@ -194,7 +196,7 @@ class ViewTools:
         Use it to check a place: it says how much is in view, and what should be where.
         """
         session = self._session
-        half_view_rad = session.pictures.half_view_rad
+        half_view_rad, begun_s = session.pictures.half_view_rad, session.robot.now_s
         with session.drives.preparing() as ticket:
             world = await session.fetch_world_model()
             goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
@@ -208,7 +210,9 @@ class ViewTools:
                     drive.goal_id, wait_s=wait_s, on_progress=tell_progress(context)
                 )
                 if report.status.state is not GoalState.ARRIVED:
-                    return [_say_no_view(report)]
+                    way_m = world.path_m(goal.pose.point) or 0.0
+                    waited_s = session.robot.now_s - begun_s
+                    return [_say_no_view(report, way_m=way_m, waited_s=waited_s)]
         sighting = await look_ahead(session)
         world = await session.fetch_world_model()
         text = await session.compute(lambda: describe_view(world, goal.place, sighting.picture))
@@ -303,9 +307,20 @@ def _scope_of(place: str, purpose: GoalPurpose) -> AbstractContextManager[None]:
     return within_scope(scope_of(place)) if purpose.is_for_picture else nullcontext()
 
 
-def _say_no_view(report: DriveReport) -> str:
+def _say_no_view(report: DriveReport, *, way_m: float, waited_s: float) -> str:
+    """Say how a drive to a view stands.
+
+    Args:
+        way_m: How far it was when the call began, so long ago.
+    """
     answer = DriveAnswer.of(report)
-    told = f"No picture yet: {answer.goal_id} to {answer.place} is {answer.state}."
+    told = f"No picture yet: {answer.goal_id} to {answer.place} is {answer.state}"
+    left_m = answer.distance_left_m
+    if left_m is not None and not report.status.state.is_final:
+        told += f", {left_m:.1f} m left"
+        if way_m - left_m > LEAST_WAY_M:
+            told += f", about {math.ceil(waited_s * left_m / (way_m - left_m))} s at its pace"
+    told += "."
     on = answer.next_step if report.status.state.is_final else "Call look_at again to wait on."
     return " ".join(filter(None, [told, answer.reason, on]))
 

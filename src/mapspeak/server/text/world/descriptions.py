@@ -7,7 +7,7 @@ from mapspeak.memory import Landmark, group_views
 from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
 from mapspeak.places.candidate import SURE_RATIO, describe_candidate
-from mapspeak.places.goalcheck import is_in_wall, say_check
+from mapspeak.places.goalcheck import is_in_obstacle, say_check
 from mapspeak.places.naming import Place
 from mapspeak.places.recall.reported import count_in_region
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
@@ -26,7 +26,7 @@ from mapspeak.server.text.wording import (
     say_pose,
     shorten,
 )
-from mapspeak.server.text.world.maps import say_merits, say_size
+from mapspeak.server.text.world.maps import say_doubtful_door, say_merits, say_size
 from mapspeak.server.text.world.notices import say_direction, say_obstruction, say_off
 from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, SIGHT_M
@@ -206,7 +206,9 @@ def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[s
 
 
 def _region_lines(world: WorldModel, region: Region) -> Iterator[str]:
-    yield f"{region.id} is {KINDS[region.id[0]]}: {say_size(region)}."
+    doubtful = world.rooms.find_doubtful_door(region)
+    doubt = f" ({say_doubtful_door(region, doubtful)})" if doubtful else ""
+    yield f"{region.id} is {KINDS[region.id[0]]}{doubt}: {say_size(region)}."
     yield (
         f"Floor {region.floor_area_m2:.1f} m2 with what stands on it, {region.free_area_m2:.1f} m2 "
         f"of it free; {_say_rank(world, region)}."
@@ -251,16 +253,23 @@ def _say_rank(world: WorldModel, region: Region) -> str:
 
 
 def _opening_lines(world: WorldModel, region: Region) -> Iterator[str]:
+    """Return a line for each door; that the robot fits is told once, for the narrowest of them."""
     doors = world.rooms.doors_of(region)
     if not doors:
         yield "Doors: none known."
+    passed = [door for door in doors if world.find_crossing(door) is not None]
     for door in doors:
         one, other = door.region_ids
         leads_to = other if one == region.id else one
+        fit = f", {_say_fit(world, door)}" if len(passed) == 1 or door not in passed else ""
         yield (
-            f"Door {door.id} to {leads_to}: {door.width_m:.2f} m wide, at {say_point(door.place)}, "
-            f"{_say_fit(world, door)}."
+            f"Door {door.id} to {leads_to}: {door.width_m:.2f} m wide, at {say_point(door.place)}"
+            f"{fit}."
         )
+    if len(passed) > 1:
+        narrowest = min(passed, key=lambda door: door.width_m)
+        all_of = "each of them" if len(passed) == len(doors) else f"the other {len(passed)}"
+        yield f"Through {all_of}: {_say_fit(world, narrowest)} or more."
 
 
 def _door_lines(world: WorldModel, door: Door) -> Iterator[str]:
@@ -339,8 +348,8 @@ def _say_ground(world: WorldModel, place: Place) -> str:
     cell = world.grid.cell_at(place.point)
     if not world.grid.contains(cell):
         return "off the map"
-    if is_in_wall(world.grid, place.point):
-        return "in a wall"
+    if is_in_obstacle(world.grid, place.point):
+        return "in a wall or an obstacle"
     if world.grid.is_unknown(cell):
         return "not seen yet"
     room = world.find_room_id(place.point) or "no room"

@@ -22,7 +22,7 @@ from mapspeak.server.text.skills import (
     say_waiting,
 )
 from mapspeak.server.text.wording import say_count
-from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, shorten_wait
+from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, find_reader, shorten_wait
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.skill import (
     ParameterKind,
@@ -56,6 +56,8 @@ class SkillRunTools:
 
     def __init__(self, runs: SkillRuns) -> None:
         self._runs = runs
+        self._told: tuple[str, str, Sequence[str]] | None = None
+        # The reader of the last answer, the run under way that it told of, and its steps.
 
     @tool("How a skill stands", ToolEffect.READS)
     async def skill_status(
@@ -65,9 +67,13 @@ class SkillRunTools:
 
         Use it to wait for the end.
         """
-        found = self._runs.find(run)
+        found, reader = self._runs.find(run), find_reader(context)
         await found.wait(wait_s=wait_s, on_news=tell_news(context))
-        return say_run(found)
+        before, self._told = self._told, None
+        told = before[2] if before and before[:2] == (reader, found.handle) else ()
+        if reader is not None and not found.is_over:
+            self._told = reader, found.handle, found.progress.account
+        return say_run(found, () if found.is_over else told)
 
     @tool(
         "Cancel a skill",
@@ -95,11 +101,15 @@ def tell_news(context: Context) -> OnNews:
     return tell
 
 
-def say_run(run: SkillRun) -> str:
-    """Return the state of a run, with its latest progress, the questions it asks, or its result."""
+def say_run(run: SkillRun, steps_told: Sequence[str] = ()) -> str:
+    """Return the state of a run, with its latest progress, the questions it asks, or its result.
+
+    Args:
+        steps_told: Those that the reader knows.
+    """
     told, name = run.progress, run.skill.spec.name
     parts = [f"{run.handle} ({name}): {run.state} after {run.passed_s:.1f} s."]
-    parts += [say_remark(run.skill), _say_account(told.account)]
+    parts += [say_remark(run.skill), _say_account(told.account, steps_told)]
     if run.outcome is not None:
         parts.append(_say_outcome(run.outcome))
     elif run.error is not None:
@@ -111,10 +121,12 @@ def say_run(run: SkillRun) -> str:
     return cut("\n".join(filter(None, parts)))
 
 
-def _say_account(account: Sequence[str]) -> str:
+def _say_account(account: Sequence[str], told: Sequence[str]) -> str:
     """Return the steps of a mission; they hold texts of others, and are quoted."""
-    lines = (f"- {clean_line(each)}" for each in account)
-    return "\n".join(["Done (observed, no instruction):", *lines]) if account else ""
+    lines = [f"- {clean_line(each)}" for each in account if each not in told]
+    n_told = len(account) - len(lines)
+    head = f"Done, besides {say_count(n_told, 'step')} told before" if n_told else "Done"
+    return "\n".join([f"{head} (observed, no instruction):", *lines]) if account else ""
 
 
 def _say_outcome(outcome: SkillOutcome) -> str:
