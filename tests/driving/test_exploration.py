@@ -14,6 +14,7 @@ from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.places.relations.viewpoints import face_new_walls
 from mapspeak.robot import GoalState
+from mapspeak.server.reports.exploring import ExploreAnswer
 from mapspeak.server.text.world.drives import say_progress
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.simulator import World
@@ -45,6 +46,27 @@ THREE_ROOMS = """
 ################################
 """
 START = (1.0, 3.8)
+
+MANY_ROOMS = """
+################################################
+#..........#..............#....................#
+#..........#..............#....................#
+#..........#...######.....#..........####......#
+#..........#...######................####......#
+#....................................####......#
+#....................................####......#
+#..........#...######.....#....................#
+#..........#...######.....#....................#
+#######..############..########..###########..##
+#..........#..............#..........#.........#
+#..........#..............#..........#.........#
+#...####...#..............#..........#.........#
+#...####......................####.............#
+#...####......................####.............#
+#..........#..............#...####...#.........#
+#..........#..............#..........#.........#
+################################################
+"""
 
 BEHIND_A_SLIT = """
 ################################
@@ -291,7 +313,7 @@ async def test_exploring_ends_with_the_robot_standing_when_the_time_is_over(tmp_
 
 async def test_exploring_ends_when_enough_is_known(tmp_path: Path) -> None:
     robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
-    progress = await _explore(Explorer(session_of(robot, tmp_path)), Bounds(known_ratio=0.2))
+    progress = await _explore(Explorer(session_of(robot, tmp_path)), Bounds(known_ratio=0.05))
     assert progress.state is ExplorationState.BOUND_REACHED
     assert robot.goals == []
 
@@ -412,3 +434,18 @@ async def test_a_share_that_is_reached_on_the_way_ends_it_before_the_next_fronti
         progress = await explorer.advance(bounds, wait_s=0.5, on_trip=_tell_nobody)
     assert progress.bound is BoundKind.KNOWN
     assert {*n_goals, progress.n_goals} == {progress.n_goals}
+
+
+async def test_a_frontier_that_is_none_any_more_is_left_for_the_next(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(MANY_ROOMS, start=(1.0, 2.6)))
+    explorer, gone = Explorer(session_of(robot, tmp_path)), ""
+    while True:
+        progress = await explorer.advance(Bounds(), wait_s=0.5, on_trip=_tell_nobody)
+        ids = [each.id for each in progress.frontiers]
+        trip, answer = progress.trip, ExploreAnswer.of(progress)
+        if trip is None or trip.target.frontier is not None:
+            assert answer.next.partition(":")[0] in ("", *ids)
+        assert gone == "" or trip is None or trip.target.id != gone
+        gone = "" if trip is None or trip.target.id in ids else trip.target.id
+        if progress.state.is_end:
+            break

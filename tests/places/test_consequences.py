@@ -14,8 +14,6 @@ from mapspeak.driving.exploration.progress import (
     Progress,
     find_unreachable,
     judge_end,
-    known_area_m2,
-    known_ratio,
 )
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
@@ -122,9 +120,8 @@ def ended_exploration(world: WorldModel) -> Progress:
         n_ended=0,
         driven_m=0.0,
         elapsed_s=0.0,
-        known_area_m2=known_area_m2(world),
-        known_ratio=known_ratio(world),
-        told_ratio=None,
+        known_area_m2=world.frontiers.floor_m2,
+        known_ratio=world.frontiers.known_ratio,
         frontiers=world.frontiers.frontiers,
         trip=None,
         pose=world.robot,
@@ -134,25 +131,6 @@ def ended_exploration(world: WorldModel) -> Progress:
         not_worth=(),
         closed=tuple(world.map.areas),
     )
-
-
-@pytest.mark.parametrize(
-    ("told", "known", "said"),
-    [
-        (0.747, 0.741, "74.1 %, 74.7 % before"),
-        (0.775, 0.659, "65.9 %, 77.5 % before"),
-        (0.741, 0.747, None),
-        (0.7414, 0.7413, None),
-        (None, 0.741, None),
-    ],
-)
-def test_a_known_share_that_fell_is_told_with_the_share_before_as_exactly_as_the_report_has_it(
-    told: float | None, known: float, said: str | None
-) -> None:
-    ended = ended_exploration(world_on(revision_with()))
-    sentence = say_progress(replace(ended, told_ratio=told, known_ratio=known))
-    assert ("before" in sentence) is (said is not None)
-    assert said is None or said in sentence
 
 
 def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:

@@ -11,6 +11,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import MONDAY_NOON, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.spatial import OccupancyGrid
 from served import connect, text_of
 
 pytestmark = pytest.mark.anyio
@@ -75,6 +76,24 @@ async def test_a_drive_that_failed_is_told_until_a_later_one_arrives(tmp_path: P
     assert "G1 to R1 at " in failed
     assert ": blocked." in failed
     assert "Nothing is known to be blocked" in arrived
+
+
+async def test_a_drive_to_a_frontier_that_failed_is_told_while_something_unknown_is_left_there(
+    tmp_path: Path,
+) -> None:
+    cells = two_rooms().cells.copy()
+    cells[4:7, -1] = -1
+    robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.25))
+    robot.ended["fake-1"] = GoalStatus(state=GoalState.BLOCKED)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await client.call_tool("navigate_to", {"place": "F1"})
+        left = await _blocked(client)
+        robot.grid = two_rooms()
+        seen = await _blocked(client)
+    assert "G1 to F1 at " in left
+    assert seen == (
+        "Nothing is known to be blocked: the robot gets to every room, door and remembered place."
+    )
 
 
 async def test_a_hold_comes_first(tmp_path: Path) -> None:

@@ -358,7 +358,7 @@ async def test_a_map_with_a_frontier_is_never_called_known_as_a_whole(tmp_path: 
     async with connect(robot, tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
     ((known_m2, percent, promised_m2),) = re.findall(
-        r"Explored: ([\d.]+) m2 of free floor, (\d+) %: frontiers promise about (\d+) m2", text
+        r"Explored: ([\d.]+) m2 of free floor, (\d+) %: about (\d+) m2 more are expected", text
     )
     assert "1 frontier" in text
     assert 0 < float(promised_m2) < 0.005 * float(known_m2)

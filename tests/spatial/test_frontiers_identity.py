@@ -8,6 +8,7 @@ from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierReport,
     FrontierVerdict,
+    estimate_known_ratio,
     find_frontiers,
     match_frontiers,
 )
@@ -103,8 +104,56 @@ def test_an_id_passes_to_the_piece_near_its_place_and_not_to_one_far_off() -> No
     near = dataclasses.replace(old, points=piece[:8], pose=Pose(5.8, 0.2))
     first, second = (
         FrontierReport(
-            frontiers=each, refused=(), verdict=FrontierVerdict.SOME_LEFT, n_named=len(each)
+            frontiers=each,
+            refused=(),
+            verdict=FrontierVerdict.SOME_LEFT,
+            n_named=len(each),
+            floor_m2=8.0,
+            known_ratio=0.5,
         )
         for each in ((old,), (far, near))
     )
     assert [each.id for each in match_frontiers(first, second).frontiers] == ["F2", "F1"]
+
+
+def test_the_known_share_is_of_the_floor_on_the_map_and_of_more_than_frontiers_promise() -> None:
+    found = report(room_with_openings(20, 0))
+    (frontier,) = found.frontiers
+    assert found.floor_m2 == 56 * 76 * 0.05**2 + 20 * 2 * 0.05**2
+    assert found.floor_m2 / (found.floor_m2 + frontier.gain_m2) > found.known_ratio > 0.0
+
+
+def test_behind_one_large_opening_more_is_expected_than_behind_small_ones_of_the_same_promise() -> (
+    None
+):
+    assert estimate_known_ratio(50.0, [20.0]) < estimate_known_ratio(50.0, [5.0] * 4) < 1.0
+
+
+def test_less_is_known_of_what_is_to_be_expected_while_little_is_known() -> None:
+    """Twice the floor with the same openings: more than the growth of the floor would make it."""
+    small, large = (estimate_known_ratio(floor_m2, [10.0, 10.0]) for floor_m2 in (20.0, 40.0))
+    assert 1 / large - 1 < (1 / small - 1) / 2
+
+
+def test_the_known_share_does_not_fall_when_more_is_seen_and_more_is_promised() -> None:
+    first = report(room_with_openings(20, 0))
+    second = report(room_with_openings(20, 20))
+    assert second.known_ratio < first.known_ratio
+    assert match_frontiers(first, second).known_ratio == first.known_ratio
+
+
+def test_the_known_share_is_never_more_than_one_frontier_alone_leaves() -> None:
+    whole, opened = report(room_with_openings(0, 0)), report(room_with_openings(20, 20))
+    most_m2 = max(each.gain_m2 for each in opened.frontiers)
+    assert whole.known_ratio == 1.0
+    held_ratio = match_frontiers(whole, opened).known_ratio
+    assert held_ratio == opened.floor_m2 / (opened.floor_m2 + most_m2) > opened.known_ratio
+
+
+def test_the_known_share_begins_anew_where_floor_was_lost() -> None:
+    cells = room_with_openings(20, 20)
+    whole, other = report(room_with_openings(0, 0)), cells.copy()
+    other[:, 86:] = -1
+    smaller = report(other)
+    assert smaller.floor_m2 < 0.9 * whole.floor_m2
+    assert match_frontiers(whole, smaller).known_ratio == smaller.known_ratio

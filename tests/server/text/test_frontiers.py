@@ -104,6 +104,8 @@ def test_the_verdict_says_what_is_left(verdict: FrontierVerdict, words: str) -> 
         refused=(refused(RefusalReason.NO_WAY),),
         verdict=verdict,
         n_named=1,
+        floor_m2=8.0,
+        known_ratio=0.9,
     )
     assert say_verdict(report) == words
 
@@ -115,5 +117,7 @@ def test_the_most_frequent_refusal_is_told_first() -> None:
         refused=tuple(refused(reason) for reason in reasons),
         verdict=FrontierVerdict.ALL_REFUSED,
         n_named=0,
+        floor_m2=8.0,
+        known_ratio=1.0,
     )
     assert say_verdict(report).endswith("not offered: 2 behind walls, 1 too narrow for the robot.")

@@ -20,9 +20,8 @@ from mapspeak.driving.exploration.progress import (
     Progress,
     find_not_worth,
     find_unreachable,
+    is_unknown_beside,
     judge_end,
-    known_area_m2,
-    known_ratio,
 )
 from mapspeak.driving.exploration.trips import (
     SLACK_S,
@@ -37,13 +36,11 @@ from mapspeak.worldmodel.model import WorldModel
 SEEN_RATIO = 0.3
 """Less than this of what a frontier promised is left: it has been seen from afar.
 
-Nothing else makes the robot turn on the way: two frontiers that are equally good would else take
-it back and forth between them.
+That, and the frontier's own end, make the robot turn on the way, and nothing else: two frontiers
+that are equally good would else take it back and forth between them.
 """
 PAUSE_M = 3.0
 """As the crow flies from the last pause; nearer to it there is not much else to be looked at."""
-BESIDE_M = 1.5
-"""A border with the unknown that is this near to a blocked place is what was to be seen there."""
 
 Look = Callable[[], Awaitable[object]]
 Pick = Callable[[Sequence[Frontier], WorldModel], Frontier]
@@ -74,7 +71,6 @@ class Explorer:
         self._bounds = Bounds()
         self._paused_at: Point | None = None
         self._elapsed_s = 0.0
-        self._told_ratio: float | None = None
 
     @property
     def is_going_on(self) -> bool:
@@ -99,7 +95,6 @@ class Explorer:
             if not self.is_going_on:
                 self._trips.begin_count()
                 self._paused_at, self._elapsed_s, self._bounds = None, 0.0, Bounds()
-                self._told_ratio = None
             self._bounds = bounds or self._bounds
             return await self._advance(wait_s, on_trip)
 
@@ -204,20 +199,11 @@ class Explorer:
 
     def _blocked(self, world: WorldModel) -> tuple[BlockedPlace, ...]:
         """Return the blocked places at which something unknown is left."""
-        report = world.frontiers
-        borders = [
-            *(each.pose.point for each in report.frontiers),
-            *(each.anchor for each in report.frontiers),
-            *(each.anchor for each in report.refused),
-        ]
-        return tuple(
-            place
-            for place in self._trips.blocked
-            if any(place.pose.point.distance_to(border) <= BESIDE_M for border in borders)
-        )
+        blocked = self._trips.blocked
+        return tuple(each for each in blocked if is_unknown_beside(world, each.pose.point))
 
     def _must_turn(self, world: WorldModel, target: Target) -> bool:
-        """Return True when a target has been seen from afar, or proves to be no place to stand.
+        """Return True when a target has been seen from afar, is gone, or is no place to stand.
 
         The last goal of an exploration is driven to its end.
         """
@@ -227,7 +213,8 @@ class Explorer:
         if not has_room_at(world.grid, target.pose.point, radius_m=world.radius_m):
             return True
         is_last = self._bounds.n_goals is not None and self._trips.n_begun >= self._bounds.n_goals
-        return not is_last and remaining_ratio(world.grid, frontier) < SEEN_RATIO
+        is_gone = world.frontiers.find(target.id) is None
+        return not is_last and (is_gone or remaining_ratio(world.grid, frontier) < SEEN_RATIO)
 
     def _bound_reached(self, world: WorldModel) -> BoundKind | None:
         """Return which bound ends the exploration; None where it goes on."""
@@ -239,7 +226,7 @@ class Explorer:
             return None
         if bounds.n_goals is not None and self._trips.n_begun >= bounds.n_goals:
             return BoundKind.GOALS
-        if bounds.known_ratio is not None and known_ratio(world) >= bounds.known_ratio:
+        if bounds.known_ratio is not None and world.frontiers.known_ratio >= bounds.known_ratio:
             return BoundKind.KNOWN
         return None
 
@@ -257,7 +244,6 @@ class Explorer:
         return await self._site.compute(lambda: self._report(world, bound, seen_id))
 
     def _report(self, world: WorldModel, bound: BoundKind | None, seen_id: str | None) -> Progress:
-        told_ratio, self._told_ratio = self._told_ratio, known_ratio(world)
         blocked = self._blocked(world)
         others = self._trips.blocked if self._trips.n_blocked else ()
         return Progress(
@@ -273,9 +259,8 @@ class Explorer:
             n_ended=self._trips.n_ended,
             driven_m=self._trips.driven_m,
             elapsed_s=self._elapsed_s,
-            known_area_m2=known_area_m2(world),
-            known_ratio=self._told_ratio,
-            told_ratio=told_ratio,
+            known_area_m2=world.frontiers.floor_m2,
+            known_ratio=world.frontiers.known_ratio,
             frontiers=world.frontiers.frontiers,
             trip=self._trips.current,
             pose=world.robot,

@@ -21,6 +21,8 @@ from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = 0.5
 """A border is reachable from floor within the robot's radius plus this."""
+BESIDE_M = 1.5
+"""A border with the unknown that is this near to a blocked place is what was to be seen there."""
 OUT_OF_REACH = frozenset(
     {
         RefusalReason.NO_WAY,
@@ -87,7 +89,6 @@ class Progress:
         n_ended: How many were cancelled, or ended by a stop or another goal.
         elapsed_s: Robot time of all calls.
         known_ratio: Of the free floor that is to be expected in all.
-        told_ratio: What the answer before told of that; None in the first one.
         frontiers: Where one could still go, best first.
         pose_doubt: Why it may be elsewhere.
         blocked: Where a drive failed and something unknown is left.
@@ -110,7 +111,6 @@ class Progress:
     elapsed_s: float
     known_area_m2: float
     known_ratio: float
-    told_ratio: float | None
     frontiers: tuple[Frontier, ...]
     trip: Trip | None
     pose: Pose
@@ -121,23 +121,6 @@ class Progress:
     closed: tuple[ClosedArea, ...]
     pictured_ratio: float | None = None
     passed_over: tuple[BlockedPlace, ...] = ()
-
-
-def known_ratio(world: WorldModel) -> float:
-    """Return the known share of the floor that is to be expected: what frontiers promise is not."""
-    known_m2 = known_area_m2(world)
-    return known_m2 / expected_area_m2(world) if known_m2 else 0.0
-
-
-def expected_area_m2(world: WorldModel) -> float:
-    """Return the free floor on the map and what frontiers promise; it grows with what is seen."""
-    promised_m2 = sum(frontier.gain_m2 for frontier in world.frontiers.frontiers)
-    return known_area_m2(world) + promised_m2
-
-
-def known_area_m2(world: WorldModel) -> float:
-    """Return the free floor on the map."""
-    return int(np.count_nonzero(world.grid.free)) * world.grid.resolution_m**2
 
 
 def find_unreachable(world: WorldModel) -> tuple[RefusedFrontier, ...]:
@@ -169,6 +152,17 @@ def _is_reached_near(distances: DistanceField, point: Point) -> bool:
     down, across = grid.window_around(point, distances.radius_m + NEAR_M)
     rows, cols = np.arange(down.start, down.stop), np.arange(across.start, across.stop)
     return bool(np.isfinite(distances.distances_at(rows[:, np.newaxis], cols)).any())
+
+
+def is_unknown_beside(world: WorldModel, point: Point) -> bool:
+    """Return True where something unknown is left that a drive to a point was for."""
+    report = world.frontiers
+    borders = [
+        *(each.pose.point for each in report.frontiers),
+        *(each.anchor for each in report.frontiers),
+        *(each.anchor for each in report.refused),
+    ]
+    return any(point.distance_to(border) <= BESIDE_M for border in borders)
 
 
 def find_not_worth(world: WorldModel) -> tuple[RefusedFrontier, ...]:

@@ -92,11 +92,13 @@ class ExploreAnswer(Report):
     walls_pictured_percent: float | None = Field(description="of those in sight; for the camera")
     frontiers: list[str] = Field(description="ids, the one under way first, then best first")
     n_frontiers: int
-    next: str = Field(description="the frontier under way, and why it was chosen")
+    next: str = Field(description="the frontier under way or to come, and what speaks for it")
     goal_id: str | None
     robot: PoseReport
     pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
-    cannot_reach: list[str] = Field(description="what was blocked or is left, where, and why")
+    cannot_reach: list[str] = Field(
+        description="what was blocked and, at the end, what is left: where, and why"
+    )
     on_the_way: list[str] = Field(
         description="in pictures taken on the way, which count but are not shown: what the "
         "detector reports there alone (bearing, left positive; range)"
@@ -149,16 +151,21 @@ def _percent(ratio: float | None) -> float | None:
 
 
 def _say_next(progress: Progress) -> str:
-    if progress.trip is not None:
-        return say_target(progress.trip.target)
-    best = next(iter(progress.frontiers), None)
-    return "" if best is None else f"{best.id}: {say_merits(best)}"
+    """Say where it goes by the frontiers as they are: the one under way may be none any more."""
+    target = None if progress.trip is None else progress.trip.target
+    if target is not None and target.frontier is None:
+        return say_target(target)
+    ids = _list_frontiers(progress)
+    following = next((each for each in progress.frontiers if each.id == ids[0]), None)
+    return "" if following is None else f"{following.id}: {say_merits(following)}"
 
 
 def _say_rest(progress: Progress) -> list[str]:
+    """Say what was blocked, and in the end also which borders are out of reach."""
+    unreachable = progress.unreachable if progress.state.is_end else ()
     told = [
         *(say_blocked(place) for place in progress.blocked),
-        *(say_unreachable(border) for border in progress.unreachable),
+        *(say_unreachable(border) for border in unreachable),
         *(f"{say_blocked(place)} Nothing is left there." for place in progress.passed_over),
     ]
     left_out = len(told) - MOST_NAMED

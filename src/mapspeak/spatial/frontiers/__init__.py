@@ -7,6 +7,7 @@ from mapspeak.spatial.frontiers.frontier import (
     FrontierVerdict,
     RefusalReason,
     RefusedFrontier,
+    estimate_known_ratio,
     match_frontiers,
 )
 from mapspeak.spatial.frontiers.gaps import (
@@ -28,6 +29,7 @@ __all__ = [
     "RefusalReason",
     "RefusedFrontier",
     "Tried",
+    "estimate_known_ratio",
     "find_frontiers",
     "find_proved_gap",
     "match_frontiers",

@@ -1,6 +1,7 @@
 """Frontiers as values, and their ids from call to call."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -14,6 +15,10 @@ TOUCH_M = 0.3
 """Points of one frontier on two maps are at most this far apart."""
 SAME_PLACE_M = 2.0
 """A frontier that moved farther than this gets a new id."""
+SAME_FLOOR_RATIO = 0.95
+"""A map with less of the floor known before has lost some, or is another map."""
+PROMISED_ONCE_RATIO, BEYOND_RATIO, MOST_BEYOND = 0.8, 8.0, 3.0
+"""Fitted to explorations of the 14 shipped worlds (`benchmarks/explored_share.py`)."""
 SAME_RATIO = 0.25
 """Two frontiers are one when this share of the shorter lies on the other."""
 
@@ -128,12 +133,17 @@ class FrontierReport:
         refused: Refused borders, longest first.
         ways: Between the frontiers that were compared; valid for this map.
         n_named: The highest frontier number given so far.
+        floor_m2: Free floor on the map.
+        known_ratio: Its estimated share of all floor there is; it falls only where floor is lost,
+            or where one frontier alone promises more than it leaves.
     """
 
     frontiers: tuple[Frontier, ...]
     refused: tuple[RefusedFrontier, ...]
     verdict: FrontierVerdict
     n_named: int
+    floor_m2: float
+    known_ratio: float
     ways: WaysBetween | None = None
 
     def find(self, frontier_id: str) -> Frontier | None:
@@ -154,7 +164,38 @@ def match_frontiers(previous: FrontierReport, current: FrontierReport) -> Fronti
         if index not in ids:
             n_named += 1
         named.append(dataclasses.replace(frontier, id=ids.get(index, f"F{n_named}")))
-    return dataclasses.replace(current, frontiers=tuple(named), n_named=n_named)
+    known_ratio = _hold_known_ratio(previous, current)
+    return dataclasses.replace(
+        current, frontiers=tuple(named), n_named=n_named, known_ratio=known_ratio
+    )
+
+
+def estimate_known_ratio(floor_m2: float, gains_m2: Sequence[float]) -> float:
+    """Estimate which share of all floor is known, by what frontiers promise.
+
+    Some of it is promised by two. Behind a frontier that promises much, compared with what is
+    known, lies more than it promises: so little is known at first.
+
+    Args:
+        floor_m2: Known floor.
+    """
+    if not floor_m2:
+        return 0.0
+    more_m2 = sum(
+        gain_m2 * (PROMISED_ONCE_RATIO + min(BEYOND_RATIO * gain_m2 / floor_m2, MOST_BEYOND))
+        for gain_m2 in gains_m2
+    )
+    return floor_m2 / (floor_m2 + more_m2)
+
+
+def _hold_known_ratio(previous: FrontierReport, current: FrontierReport) -> float:
+    """Return the known share, no smaller than before on the same map: promises come and go."""
+    floor_m2 = current.floor_m2
+    if floor_m2 < SAME_FLOOR_RATIO * previous.floor_m2:
+        return current.known_ratio
+    most_m2 = max((each.gain_m2 for each in current.frontiers), default=0.0)
+    most_ratio = floor_m2 / (floor_m2 + most_m2) if floor_m2 else 0.0
+    return max(current.known_ratio, min(previous.known_ratio, most_ratio))
 
 
 def _inherited(previous: tuple[Frontier, ...], current: tuple[Frontier, ...]) -> dict[int, str]:

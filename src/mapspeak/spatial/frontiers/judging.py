@@ -20,6 +20,7 @@ from mapspeak.spatial.frontiers.frontier import (
     FrontierVerdict,
     RefusalReason,
     RefusedFrontier,
+    estimate_known_ratio,
 )
 from mapspeak.spatial.frontiers.gaps import NOTHING_TRIED, Tried, mask_behind
 from mapspeak.spatial.frontiers.ranking import gain_rate, rank
@@ -56,7 +57,8 @@ def find_frontiers(
     if distances is None:
         distances = distances_from(grid, position, radius_m=radius_m)
     borders, n_short = find_borders(grid, least_length_m=radius_m)
-    frontiers, refused = _judge(distances, borders, tried)
+    floor_m2 = int(np.count_nonzero(grid.free)) * grid.resolution_m**2
+    frontiers, refused = _judge(distances, borders, tried, floor_m2)
     ranked, ways = rank(distances, merge_by_place(frontiers))
     return FrontierReport(
         frontiers=tuple(
@@ -65,6 +67,8 @@ def find_frontiers(
         refused=tuple(sorted(refused, key=lambda border: -border.length_m)),
         verdict=_verdict(distances, ranked, has_borders=bool(borders or n_short)),
         n_named=len(ranked),
+        floor_m2=floor_m2,
+        known_ratio=estimate_known_ratio(floor_m2, [each.gain_m2 for each in ranked]),
         ways=ways,
     )
 
@@ -101,7 +105,7 @@ def _verdict(
 
 
 def _judge(
-    distances: DistanceField, borders: Sequence[Border], tried: Tried
+    distances: DistanceField, borders: Sequence[Border], tried: Tried, floor_m2: float
 ) -> tuple[list[Frontier], list[RefusedFrontier]]:
     """Return each border as a frontier with its best pose, or as refused.
 
@@ -123,7 +127,6 @@ def _judge(
             cut_off.append(border)
     # One and a half robots' width squared, a hundredth of the floor, or 0.5 m2 are worth a drive:
     # the less, the smaller the robot and the known floor.
-    floor_m2 = int(np.count_nonzero(distances.grid.free)) * distances.grid.resolution_m**2
     least_m2 = min((3 * distances.radius_m) ** 2, 0.01 * floor_m2, 0.5)
     for (border, _), frontier in zip(open_ones, _find_poses(distances, open_ones), strict=True):
         if frontier.gain_m2 >= least_m2:

@@ -194,22 +194,14 @@ EXPLORATION_STATES = {
 
 
 def say_progress(progress: Progress) -> str:
-    """Say why a call of an exploration ended as it did, and why the known share fell if it did.
+    """Say why a call of an exploration ended as it did.
 
     At its end also how much of the walls pictures show, where that matters.
     """
     said, walls = _say_progress(progress), progress.pictured_ratio
     if walls is not None and progress.state.is_end:
         said += f" Pictures show {walls:.1%} of the walls."
-    if progress.told_ratio is None:
-        return said
-    told, known = (f"{100 * share:.1f} %" for share in (progress.told_ratio, progress.known_ratio))
-    if progress.known_ratio >= progress.told_ratio or known == told:
-        return said
-    return (
-        f"{said} More floor can be expected than before, so that less of it "
-        f"is known: {known}, {told} before."
-    )
+    return said
 
 
 def _say_progress(progress: Progress) -> str:

@@ -2,7 +2,6 @@
 
 import math
 
-from mapspeak.driving.exploration.progress import expected_area_m2, known_area_m2, known_ratio
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import tell_place
@@ -93,18 +92,16 @@ def say_direction(world: WorldModel, point: Point) -> str:
 
 
 def say_explored(world: WorldModel) -> str:
-    """Say how much floor is known, and what frontiers promise: no total, for that is not known.
-
-    What they promise is estimated anew at each look; it may be seen from two, or lie farther.
-    """
-    known_m2, percent = known_area_m2(world), round(100 * known_ratio(world))
+    """Say how much floor is known, and how much more is to be expected."""
+    known_m2, known_ratio = world.frontiers.floor_m2, world.frontiers.known_ratio
+    percent = round(100 * known_ratio)
     if not world.frontiers.frontiers:
         return f"{known_m2:.1f} m2 of free floor, {percent} %."
-    promised_m2 = expected_area_m2(world) - known_m2
+    more_m2 = known_m2 / known_ratio - known_m2
     # Not all of it, as long as there is a frontier to go to.
     return (
-        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: frontiers promise about "
-        f"{_round(promised_m2)} m2 more for now."
+        f"{known_m2:.1f} m2 of free floor, {min(percent, 99)} %: about {_round(more_m2)} m2 more "
+        "are expected."
     )
 
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from itertools import groupby
 
-from mapspeak.driving.drivereport import Drive
-from mapspeak.driving.exploration.progress import find_refused
+from mapspeak.driving.drivereport import FRONTIER, Drive
+from mapspeak.driving.exploration.progress import find_refused, is_unknown_beside
 from mapspeak.errors import GoalError
 from mapspeak.memory.events import Effect, Event
 from mapspeak.memory.quoting import quote_name
@@ -35,7 +35,6 @@ MINOR = {BORDERS, FAILED}
 EVERYWHERE = (
     "Nothing is known to be blocked: the robot gets to every room, door and remembered place."
 )
-NOTHING = f"{EVERYWHERE} No drive has failed."
 MOST_WAYS = 30
 MOST_SIZES = 60
 MOST_REASONS = 6
@@ -64,7 +63,7 @@ def describe_blocked(
         "rooms without a way": list(_say_rooms(world)),
         "remembered places without a way": list(_say_places(world)),
         BORDERS: list(_say_borders(world)),
-        FAILED: [_say_drive(drive, now_s) for drive in failed],
+        FAILED: [_say_drive(drive, now_s) for drive in failed if _is_open(world, drive)],
     }
     known = {what: lines for what, lines in parts.items() if lines}
     counts = {what: len(lines) for what, lines in known.items()}
@@ -79,7 +78,7 @@ def describe_blocked(
 def _say_in_the_way(counts: Mapping[str, int]) -> str:
     """Say first whether the robot gets everywhere; how often what is by the way."""
     if not counts:
-        return NOTHING
+        return EVERYWHERE
     told = ", ".join(f"{what} ({n})" for what, n in counts.items())
     return f"{EVERYWHERE} Else: {told}." if counts.keys() <= MINOR else f"In the way: {told}."
 
@@ -142,6 +141,12 @@ def _say_borders(world: WorldModel) -> Iterator[str]:
         shown = "; ".join(borders[:MOST_LINES])
         n_more = len(borders) - MOST_LINES
         yield f"{why}: {shown}{f'; {n_more} more' if n_more > 0 else ''}."
+
+
+def _is_open(world: WorldModel, drive: Drive) -> bool:
+    """Return False for a drive to a frontier that has been seen since."""
+    is_to_frontier = FRONTIER.fullmatch(drive.place) is not None
+    return not is_to_frontier or is_unknown_beside(world, drive.goal.point)
 
 
 def _say_drive(drive: Drive, now_s: float) -> str:
