@@ -25,7 +25,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exploration import Truth, known_ratio
+from benchmarks.exploration import Truth, choose_start, known_ratio
 from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.explorer import Explorer
@@ -72,12 +72,12 @@ class Look:
 # --- recording -------------------------------------------------------------------------------
 
 
-def load_looks(name: str) -> list[Look]:
-    """Return the looks of one world; explore it where that has not been done yet."""
-    path = FOLDER / f"{name}.npz"
+def load_looks(name: str, seed: int = 0) -> list[Look]:
+    """Return the looks of one world from one start; explore it where that was not done yet."""
+    path = FOLDER / f"{name}_{seed}.npz"
     if not path.exists():
         FOLDER.mkdir(exist_ok=True)
-        _save(anyio.run(record, name), path)
+        _save(anyio.run(record, name, seed), path)
     with np.load(path) as kept:
         return [
             Look(
@@ -110,9 +110,9 @@ def _pose_row(pose: Pose) -> tuple[float, float, float]:
     return pose.x, pose.y, pose.yaw_rad
 
 
-async def record(name: str) -> list[Look]:
+async def record(name: str, seed: int) -> list[Look]:
     """Explore a world goal by goal, with a look at every answer."""
-    simulation = Simulation(load_world(name), seed=0)
+    simulation = Simulation(choose_start(load_world(name), seed), seed=seed)
     truth = Truth(simulation.truth.floor)
     robot = SimulatedRobot(simulation, has_detector=False)
     looks: list[Look] = []

@@ -221,7 +221,10 @@ def check_counts(
         percent = 100 * known_m2 / (known_m2 + promised_m2)
         yield f"{share[2]} % explored, not {percent:.1f}", abs(int(share[2]) - percent) <= 1.5
         most_m2 = max(each.gain_m2 for each in world.frontiers.frontiers)
-        yield f"{share[3]} m2 expected, one promises {most_m2:.1f}", promised_m2 >= 0.75 * most_m2 - 0.1
+        yield (
+            f"{share[3]} m2 expected, one promises {most_m2:.1f}",
+            promised_m2 >= 0.75 * most_m2 - 0.1,
+        )
     unnoted = re.search(r"^Rooms without a note: (.*)\.$", text, re.MULTILINE)
     if unnoted or "Every room has a note." in text:
         noted = {world.find_room_id(each.waypoint.pose.point) for each in world.places}

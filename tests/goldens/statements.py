@@ -498,7 +498,7 @@ def _check_drive(
 
 
 def _check_exploration(
-    told: Statements, world: WorldModel, text: str, report: Mapping[str, Any]
+    told: Statements, world: WorldModel, _text: str, report: Mapping[str, Any]
 ) -> Iterator[Fact]:
     ended = sum(report[name] for name in ("n_arrived", "n_seen", "n_blocked"))
     under_way = report["n_goals"] - ended

@@ -74,7 +74,9 @@ async def test_that_the_robot_fits_through_the_doors_of_a_room_is_told_once(tmp_
         outer = text_of(await client.call_tool("describe_place", {"place": here}))
         (middle,) = re.findall(r"Door D\d+ to (R\d+): ", outer)
         text = text_of(await client.call_tool("describe_place", {"place": middle}))
-    assert len(re.findall(r"^Door D\d+ to R\d+: [\d.]+ m wide, at .*\d\.$", text, re.MULTILINE)) == 2
+    assert (
+        len(re.findall(r"^Door D\d+ to R\d+: [\d.]+ m wide, at .*\d\.$", text, re.MULTILINE)) == 2
+    )
     assert text.count("fits with") == outer.count("fits with") == 1
 
 
@@ -84,7 +86,9 @@ async def test_a_room_that_is_probably_part_of_another_is_described_so_as_the_ma
     robot = FakeRobot(grid_from_text(ALCOVE, resolution_m=0.2))
     async with connect(robot, tmp_path) as client:
         drawn = text_of(await client.call_tool("look_at_map", {"full": True}))
-        ((region, part),) = re.findall(r"^(\w+) \| [\d.]+\+? \((\w+ part of .*?)\)", drawn, re.MULTILINE)
+        ((region, part),) = re.findall(
+            r"^(\w+) \| [\d.]+\+? \((\w+ part of .*?)\)", drawn, re.MULTILINE
+        )
         text = text_of(await client.call_tool("describe_place", {"place": region}))
     assert text.startswith(f"{region} is a room ({part}):")
 

@@ -306,7 +306,9 @@ async def test_a_mission_under_way_is_told_without_the_steps_that_were_told(
 ) -> None:
     async with missions(tmp_path) as caller:
         caller.robot.may_drive = anyio.Event()
-        await caller.ask("run_mission", tree="- note: begun\n- drive: R2\n- note: there\n", wait_s=0)
+        await caller.ask(
+            "run_mission", tree="- note: begun\n- drive: R2\n- note: there\n", wait_s=0
+        )
         first, again = await caller.ask("skill_status"), await caller.ask("skill_status")
         caller.robot.may_drive.set()
         over = await caller.until("succeeded")
