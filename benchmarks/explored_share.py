@@ -87,7 +87,8 @@ def tell(course: Course, estimate: Estimate) -> Shares:
 
 def sum_promises(course: Course) -> Shares:
     """Return the known share by the promises alone."""
-    return course.floors_m2 / (course.floors_m2 + np.array([sum(each) for each in course.gains_m2]))
+    promised_m2 = np.array([sum(each) for each in course.gains_m2])
+    return np.asarray(course.floors_m2 / (course.floors_m2 + promised_m2))
 
 
 def estimate_by(once_ratio: float, beyond_ratio: float) -> Estimate:

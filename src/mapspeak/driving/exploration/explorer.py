@@ -108,7 +108,8 @@ class Explorer:
                 if bound is not None:
                     await self._trips.give_up(is_seen=bound is not BoundKind.DURATION)
                     return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
-                if (seen_id := self._find_seen_from_here(world)) is not None:
+                seen_id = await self._site.compute(partial(self._find_seen_from_here, world))
+                if seen_id is not None:
                     await self._trips.give_up(is_seen=True)
                     await turn_for_picture(self._site, on_progress=on_trip)
                     world = await self._site.fetch_world_model()
@@ -166,8 +167,10 @@ class Explorer:
         Return None when no target is left.
         """
         trip = self._trips.current
-        if trip is not None and not self._must_turn(world, trip.target):
-            return TripState.UNDER_WAY
+        if trip is not None:
+            must_turn = partial(self._must_turn, world, trip.target)
+            if not await self._site.compute(must_turn):
+                return TripState.UNDER_WAY
         target = await self._site.compute(lambda: self._find_target(world))
         if target is None:
             await self._trips.give_up(is_seen=True)
