@@ -27,7 +27,7 @@ from mapspeak.server.text.wording import (
     shorten,
 )
 from mapspeak.server.text.world.maps import say_doubtful_door, say_merits, say_size
-from mapspeak.server.text.world.notices import say_direction, say_obstruction, say_off
+from mapspeak.server.text.world.notices import say_direction, say_fit, say_off
 from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, SIGHT_M
 from mapspeak.spatial.frontiers import Frontier
@@ -261,7 +261,7 @@ def _opening_lines(world: WorldModel, region: Region) -> Iterator[str]:
     for door in doors:
         one, other = door.region_ids
         leads_to = other if one == region.id else one
-        fit = f", {_say_fit(world, door)}" if len(passed) == 1 or door not in passed else ""
+        fit = f", {say_fit(world, door)}" if len(passed) == 1 or door not in passed else ""
         yield (
             f"Door {door.id} to {leads_to}: {door.width_m:.2f} m wide, at {say_point(door.place)}"
             f"{fit}."
@@ -269,23 +269,15 @@ def _opening_lines(world: WorldModel, region: Region) -> Iterator[str]:
     if len(passed) > 1:
         narrowest = min(passed, key=lambda door: door.width_m)
         all_of = "each of them" if len(passed) == len(doors) else f"the other {len(passed)}"
-        yield f"Through {all_of}: {_say_fit(world, narrowest)} or more."
+        yield f"Through {all_of}: {say_fit(world, narrowest)} or more."
 
 
 def _door_lines(world: WorldModel, door: Door) -> Iterator[str]:
     yield f"{door.id} is a door or opening between {' and '.join(door.region_ids)}."
     yield (
         f"Its middle is at {say_point(door.place)}, {door.width_m:.2f} m from post to post; "
-        f"{_say_fit(world, door)}."
+        f"{say_fit(world, door)}."
     )
-
-
-def _say_fit(world: WorldModel, door: Door) -> str:
-    width_m = 2 * world.radius_m
-    if world.find_crossing(door) is None:
-        return f"{say_obstruction(world, door)}: no way for the robot, {width_m:.2f} m wide"
-    spare_m = max(door.width_m - width_m, 0.0) / 2
-    return f"the robot, {width_m:.2f} m wide, fits with {spare_m:.2f} m on each side"
 
 
 def _frontier_lines(world: WorldModel, frontier: Frontier) -> Iterator[str]:

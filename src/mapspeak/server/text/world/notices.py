@@ -65,6 +65,15 @@ def say_obstruction(world: WorldModel, door: Door) -> str:
     return "blocked" if is_any_reached else "out of reach"
 
 
+def say_fit(world: WorldModel, door: Door) -> str:
+    """Say whether the robot fits through a door, and with how much to spare."""
+    width_m = 2 * world.radius_m
+    if world.find_crossing(door) is None:
+        return f"{say_obstruction(world, door)}: no way for the robot, {width_m:.2f} m wide"
+    spare_m = max(door.width_m - width_m, 0.0) / 2
+    return f"the robot, {width_m:.2f} m wide, fits with {spare_m:.2f} m on each side"
+
+
 def say_area(area: ClosedArea) -> str:
     """Return what a closed area is called; the words of an event are not the operator's: quoted."""
     name = shorten(area.name)
