@@ -10,15 +10,7 @@ import numpy as np
 
 from mapspeak.errors import LinkError
 from mapspeak.memory.quoting import clean_line
-from mapspeak.ros.definitions.types import (
-    FLOATS,
-    TEXTS,
-    TIMES,
-    WHOLES,
-    Field,
-    TypeBook,
-    look_up,
-)
+from mapspeak.ros.definitions.types import FLOATS, TEXTS, TIMES, WHOLES, Field, TypeBook, look_up
 from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.skill import JsonValue, ParameterKind, SkillParameter
 

@@ -5,14 +5,7 @@ from collections.abc import Iterable, Iterator
 from mapspeak.memory.quoting import quote
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
-from mapspeak.skill import (
-    Arguments,
-    JsonValue,
-    Skill,
-    SkillCode,
-    SkillEffect,
-    SkillSpec,
-)
+from mapspeak.skill import Arguments, JsonValue, Skill, SkillCode, SkillEffect, SkillSpec
 from mapspeak.skills.arguments import say_wanted
 from mapspeak.skills.bounds import MissionBounds
 from mapspeak.skills.missionrecord import Interrupted
