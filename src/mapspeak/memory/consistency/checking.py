@@ -162,17 +162,15 @@ class MemoryCheck:
 
     @cached_property
     def findings(self) -> tuple[MemoryFinding, ...]:
-        """All findings, in the order of the places; deterministic."""
+        """All findings: in the order of the places, then of things the weightiest first."""
         waypoints, placed = self._places.waypoints, self._unseen.placed
-        of_things = (
-            *chain.from_iterable(self._two_labels(i, n_others=i) for i in range(len(placed))),
-            *chain.from_iterable(map(_points_past, placed)),
-            *self._unseen.find_all(),
-        )
-        self._against = {id(thing): [] for thing in placed}
-        for finding in of_things:
-            for thing in finding.things:
-                self._against[id(thing)].append(finding)
+        of_things = [
+            each
+            for thing in placed
+            for each in self._find_against(thing)
+            if each.things[0] is thing
+        ]
+        of_things.sort(key=lambda each: each.weight)
         of_places = chain.from_iterable(map(self._check_place, waypoints))
         return (*of_places, *check_duplicates(waypoints), *of_things)
 
@@ -192,12 +190,12 @@ class MemoryCheck:
         return (*of_places, *self._find_against(thing))
 
     def _find_against(self, thing: Thing) -> Sequence[MemoryFinding]:
-        number = self._unseen.number_of(thing)
+        number = self._unseen.numbers.get(id(thing))
         if number is None:
             return ()
         if id(thing) not in self._against:
             self._against[id(thing)] = [
-                *self._two_labels(number, n_others=len(self._unseen.placed)),
+                *self._two_labels(number),
                 *_points_past(thing),
                 *self._unseen.find(thing),
             ]
@@ -217,10 +215,10 @@ class MemoryCheck:
             misfiled = self._misfiled if filing and filing[0].id != filing[1].id else {}
             yield from check_rooms(self._rooms, waypoint, seen, misfiled)
 
-    def _two_labels(self, number: int, *, n_others: int) -> Iterator[MemoryFinding]:
-        """Return which of the first things are in the place of one and called otherwise."""
+    def _two_labels(self, number: int) -> Iterator[MemoryFinding]:
+        """Return which things are in the place of one and called otherwise."""
         placed, at = self._unseen.placed, self._unseen.at
-        near = find_near(at[:n_others], at[number], ONE_PLACE_M).tolist()
+        near = find_near(at, at[number], ONE_PLACE_M).tolist()
         pairs = [(placed[min(each, number)], placed[max(each, number)]) for each in near]
         pairs = [
             (one, two)

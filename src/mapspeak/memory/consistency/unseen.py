@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from datetime import datetime
 from functools import cached_property
-from itertools import chain, count, islice, repeat, zip_longest
+from itertools import count, islice, repeat, zip_longest
 
 import numpy as np
 
@@ -50,6 +50,7 @@ class UnseenThings:
         self.placed = [thing for thing in found.things if thing.position is not None]
         self.numbers = dict(zip(map(id, self.placed), count(), strict=False))
         known = {} if earlier is None else earlier.numbers
+        # The number of each among the earlier ones; -1 for a new one.
         came_from = np.fromiter(map(known.get, self.numbers, repeat(-1)), np.intp)
         self.at = self._place(earlier, came_from)
         self._looks_at = np.full((len(self._waypoints), 5), np.nan)
@@ -81,12 +82,7 @@ class UnseenThings:
     def _take_over(
         self, earlier: "UnseenThings", came_from: IntArray, others: Iterable[Waypoint]
     ) -> None:
-        """Take over what depends on no changed look or thing.
-
-        Args:
-            came_from: The number of each thing among the earlier ones; -1 for a new one.
-            others: The looks, of then and of now, that are not the very same.
-        """
+        """Take over what depends on none of the other looks, nor on a changed thing."""
         new = [self.placed[number] for number in np.flatnonzero(came_from < 0).tolist()]
         is_gone = np.ones(len(earlier.placed), dtype=np.bool_)
         is_gone[came_from[came_from >= 0]] = False
@@ -94,7 +90,7 @@ class UnseenThings:
         names = {name for thing in changed for name in thing.waypoints}
         before = {name: earlier.seen_from.get(name, ()) for name in names}
         seen_from = {
-            name: [each for each in things if self.number_of(each) is not None]
+            name: [each for each in things if id(each) in self.numbers]
             for name, things in before.items()
         }
         for thing in new:
@@ -113,26 +109,14 @@ class UnseenThings:
             if number is not None and not is_stale[number]:
                 self.known[known] = findings
 
-    def number_of(self, thing: Thing) -> int | None:
-        """Return the number of this very thing among the placed ones; None if it is none."""
-        return self.numbers.get(id(thing))
-
-    def find_all(self) -> Iterator[MemoryFinding]:
-        """Return the findings about all things: of each in turn what looks miss, then the moved."""
-        yield from chain.from_iterable(map(self._unseen, self.placed))
-        for alike in self._alike.values():
-            for old in alike:
-                if self._is_gone(old):
-                    yield from self._moved(old)
-
     def find(self, thing: Thing) -> Iterator[MemoryFinding]:
-        """Return the findings about one placed thing, in the order that they have among all."""
+        """Return the findings about one placed thing: what looks miss, then whether it moved."""
         yield from self._unseen(thing)
         yield from self._moved(thing)
 
     def find_moved(self, old: Thing) -> Thing | None:
         """Return what one that is gone is by now: the only thing of its name that is new since."""
-        if self.number_of(old) is None or not self._is_gone(old):
+        if id(old) not in self.numbers or not self._is_gone(old):
             return None
         others = self._find_partners(old)
         is_it = len(others) == 1 and len(self._find_partners(others[0])) == 1
@@ -148,20 +132,16 @@ class UnseenThings:
         return seen_from
 
     @cached_property
-    def _alike(self) -> dict[frozenset[str], list[Thing]]:
-        """The things by groups of labels, so that two that may be one are in the same."""
+    def _alike(self) -> dict[str, list[Thing]]:
+        """By each label, the things that may be what is called so, and more of their kind."""
         by_label: defaultdict[str, list[Thing]] = defaultdict(list)
         for thing in self.placed:
             by_label[thing.label].append(thing)
-        groups = group_names(list(by_label))
-        return {
-            group: [thing for label in sorted(group) for thing in by_label[label]]
-            for group in groups
-        }
-
-    @cached_property
-    def _group_of(self) -> dict[str, frozenset[str]]:
-        return {label: group for group in self._alike for label in group}
+        alike = dict[str, list[Thing]]()
+        for group in group_names(list(by_label)):
+            things = [thing for label in sorted(group) for thing in by_label[label]]
+            alike |= dict.fromkeys(group, things)
+        return alike
 
     def _unseen(self, thing: Thing) -> tuple[MemoryFinding, ...]:
         if id(thing) not in self.known:
@@ -251,7 +231,7 @@ class UnseenThings:
         is_gone = self._is_gone(thing)
         partners = (
             other
-            for other in self._alike[self._group_of[thing.label]]
+            for other in self._alike[thing.label]
             if (_is_newer(other, thing) if is_gone else _is_newer(thing, other))
             and name_the_same(thing.label, other.label)
             and self._is_gone(other) is not is_gone
@@ -262,11 +242,7 @@ class UnseenThings:
 def find_near(
     places: FloatArray, point: FloatArray | tuple[float, float], reach_m: float
 ) -> IntArray:
-    """Return which of many places are within reach of a point.
-
-    Args:
-        places: Their first two columns are their x and y.
-    """
+    """Return which of many places, whose first columns are x and y, are near a point."""
     east, north = places[:, 0] - point[0], places[:, 1] - point[1]
     return np.flatnonzero(east * east + north * north <= reach_m * reach_m)
 

@@ -265,9 +265,7 @@ class EntryIndex:
                 ratios = np.maximum(
                     ratios, self._common_words.score_ratios(common, WHOLE_WORD_WEIGHTS, size=size)
                 )
-                missing = self._kinds.find_missing_called(
-                    understood
-                ) or self._kinds.find_missing_said(understood)
+                missing = self._kinds.find_missing_said(understood)
         else:
             vector = self.vectors.embedder.embed([understood])[0].astype(np.float64)
             part_ratios, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)

@@ -256,8 +256,13 @@ class KindIndex:
         return read_kinds()[self._numbers[row]].names[0], float(ratios[row])
 
     def find_missing_said(self, request: str) -> tuple[str, float] | None:
-        """Find the kind that is not remembered and says most of a request by its names and uses."""
-        if any(self._n_known.get(kind) for kind in find_kinds_called(request)):
+        """Find the kind that is not remembered and that a request names, or says most of."""
+        called, stems = find_kinds_called(request), content_stems(request)
+        absent = (kind for kind in called if not self._n_known.get(kind))
+        names = (name for kind in absent for name in kind.names if content_stems(name) == stems)
+        if (named := next(names, None)) is not None:
+            return named, 1.0
+        if called:
             return None
         assert self._words is not None, "without a model words are compared"  # noqa: S101 - so
         kinds = read_kinds()
@@ -265,13 +270,6 @@ class KindIndex:
         ratios = self._words.score_ratios(asked, WHOLE_WORD_WEIGHTS, size=len(kinds))
         number = int(np.where(self._find_absent(), ratios, 0.0).argmax())
         return (kinds[number].names[0], float(ratios[number])) if ratios[number] > 0 else None
-
-    def find_missing_called(self, request: str) -> tuple[str, float] | None:
-        """Find the kind that a request names and nothing else, if it is not remembered."""
-        stems = content_stems(request)
-        called = (kind for kind in find_kinds_called(request) if not self._n_known.get(kind))
-        names = (name for kind in called for name in kind.names if content_stems(name) == stems)
-        return next(((name, 1.0) for name in names), None)
 
     def _find_by_meaning(
         self, labels: Iterable[str], vectors: TextVectors, of_names: Floats
