@@ -56,6 +56,13 @@ def test_no_pose_on_the_other_side_of_a_wall_is_offered() -> None:
     assert "nearest pose" not in caught.value.hint
 
 
+def test_for_a_closed_place_no_pose_on_the_other_side_of_its_wall_is_offered() -> None:
+    north = event(Effect.CLOSED, outlines=(corners((8.2, 7.6), (15.8, 10.4)),), id="E2")
+    with pytest.raises(GoalError, match="closed by event E2") as caught:
+        choose_goal(world_on(revision_with(north)), place=None, x=8.9, y=9.0, yaw_deg=None)
+    assert "nearest pose" not in caught.value.hint
+
+
 def test_closed_floor_is_as_far_from_obstacles_as_it_was() -> None:
     world = world_on(revision_with(*BOTH))
     told = describe_place(world, find_place(world, "12, 6.5"), picture_ids={})

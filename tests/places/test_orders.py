@@ -143,6 +143,26 @@ def test_too_few_are_told_apart_from_those_without_a_way() -> None:
         find_place(world_of(text=shut), "second-nearest room")
 
 
+HALL_WITH_TWO_ROOMS = "\n".join(
+    [
+        "#" * 66,
+        *["#" + "." * 64 + "#"] * 42,
+        "#" * 12 + "...." + "#" * 30 + "...." + "#" * 16,
+        *["#" + "." * 30 + "#" + "." * 33 + "#"] * 14,
+        "#" * 66,
+    ]
+)
+
+
+def test_where_more_rooms_are_meant_than_there_are_open_spaces_count_too() -> None:
+    world = world_of(text=HALL_WITH_TWO_ROOMS, robot=Pose(8.0, 8.0))
+    assert [each.id[0] for each in world.rooms.regions].count("O") == 1
+    two = {each.name for each in find_places(world, "two nearest rooms")}
+    three = {each.name for each in find_places(world, "three nearest rooms")}
+    assert [each[0] for each in two] == ["R", "R"]
+    assert three == {each.name for each in find_places(world, "all rooms")}
+
+
 WITH_A_FRONTIER = FLAT.replace("....................#\n", "....................?\n")
 
 

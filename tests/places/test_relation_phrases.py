@@ -72,6 +72,8 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "relations.md"
         ),
         ("all of the rooms", Several(kind=Kind.ROOM)),
         ("every door of C1", Several(kind=Kind.DOOR, at="C1")),
+        ("doors of C1", Several(kind=Kind.DOOR, at="C1")),
+        ("the doors into C1", Several(kind=Kind.DOOR, at="C1")),
         ("every remembered fire extinguisher", Several(label="fire extinguisher")),
     ],
 )

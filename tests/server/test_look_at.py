@@ -2,6 +2,8 @@
 
 import math
 import re
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -10,11 +12,13 @@ from mcp.client import Client
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.robot import GoalState
+from mapspeak.robot import Detection, GoalState
 from served import connect, pictures_of, report_of, text_of
 
 pytestmark = pytest.mark.anyio
 
+SIGN = Point(7.4, 1.4)
+"""At the east wall of the east room."""
 WITH_SCREEN = grid_from_text(
     """
     ##############################
@@ -126,19 +130,41 @@ async def test_a_thing_in_view_from_near_is_looked_at_from_where_the_robot_stand
     assert "T1" in columns(told)
 
 
-@pytest.mark.parametrize(("seen_m", "least_m", "most_m"), [(1.0, 0.7, 1.5), (3.5, 1.5, 2.5)])
-async def test_a_thing_is_not_looked_at_from_much_nearer_than_it_was_seen(
-    tmp_path: Path, seen_m: float, least_m: float, most_m: float
-) -> None:
-    robot = FakeRobot(two_rooms(), pose=Pose(7.4 - seen_m, 1.4))
-    async with connect(robot, tmp_path) as client:
+@asynccontextmanager
+async def seeing_a_sign(folder: Path, seen_m: float) -> AsyncGenerator[tuple[FakeRobot, Client]]:
+    """A robot that noted a sign at the east wall from so far, and its client."""
+    robot = FakeRobot(two_rooms(), pose=Pose(SIGN.x - seen_m, SIGN.y))
+    async with connect(robot, folder) as client:
         await client.call_tool("look_through_camera", {})
         sign = {"label": "exit sign", "bearing_deg": 0, "range_m": seen_m}
         noted = {"name": "w", "description": "a wall", "safety_landmarks": [sign]}
         await client.call_tool("write_semantic_data", noted)
-        await client.call_tool("navigate_to", {"place": "exit sign"})
+        yield robot, client
+
+
+@pytest.mark.parametrize(("seen_m", "least_m", "most_m"), [(1.0, 0.7, 1.5), (3.5, 1.5, 2.5)])
+async def test_a_thing_is_not_looked_at_from_much_nearer_than_it_was_seen(
+    tmp_path: Path, seen_m: float, least_m: float, most_m: float
+) -> None:
+    async with seeing_a_sign(tmp_path, seen_m) as (robot, client):
         await client.call_tool("look_at", {"place": "exit sign"})
-    assert least_m <= Point(7.4, 1.4).distance_to(robot.pose.point) <= most_m
+    assert least_m <= SIGN.distance_to(robot.pose.point) <= most_m
+
+
+async def test_what_no_picture_from_before_it_shows_is_looked_at_again_from_farther(
+    tmp_path: Path,
+) -> None:
+    async with seeing_a_sign(tmp_path, 2.2) as (robot, client):
+        await client.call_tool("navigate_to", {"place": "exit sign"})
+        arrived = robot.pose
+        robot.detections = (
+            Detection(label="tap", bearing_rad=0.0, range_m=0.5, confidence_ratio=0.9),
+        )
+        first = text_of(await client.call_tool("look_at", {"place": "exit sign"}))
+        assert robot.pose == arrived
+        await client.call_tool("look_at", {"place": "exit sign"})
+    assert "look_at again looks from as far as it was seen" in first
+    assert 1.5 <= SIGN.distance_to(robot.pose.point) <= 2.5
 
 
 async def test_a_drive_that_takes_longer_is_waited_for_by_asking_again(tmp_path: Path) -> None:

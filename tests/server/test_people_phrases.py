@@ -115,6 +115,39 @@ async def test_the_farthest_of_a_kind_is_the_last_of_those_by_way(client: Client
     assert await _ways(client, ["second-nearest door"]) == doors[1:2]
 
 
+async def test_what_is_read_off_the_map_is_told_also_where_a_memory_is_asked(
+    client: Client,
+) -> None:
+    found = report_of(await client.call_tool("find_place", {"query": "the smallest room"}))
+    assert re.fullmatch(
+        r'"the smallest room" is R\d on the map. navigate_to and measure take such words.',
+        found["advice"],
+    )
+
+
+async def test_who_speaks_of_doors_is_offered_no_place_whose_note_names_one(
+    client: Client,
+) -> None:
+    await client.call_tool(
+        "write_semantic_data", {"name": "shop", "description": "It has a door into the corridor."}
+    )
+    doors = {"places": ["doors into the corridor from the west"]}
+    assert "is meant, use" not in text_of(await client.call_tool("measure", doors))
+
+
+async def test_who_closes_a_remembered_place_hears_how_little_of_the_room_that_is(
+    client: Client,
+) -> None:
+    where = {"x": 6.0, "y": 5.0, "yaw_deg": 0.0}
+    described = {"name": "corridor", "description": "A wide corridor.", **where}
+    await client.call_tool("write_semantic_data", described)
+    corridor = report_of(await client.call_tool("check_goal", {"place": "corridor"}))["room"]
+    closed = {"text": "wet paint", "place": "corridr", "effect": "closed"}
+    told = text_of(await client.call_tool("note_event", closed))
+    assert "0.5 m around corridor at 6.00, 5.00" in told
+    assert f"not all of {corridor}: for all of it give {corridor} as place" in told
+
+
 async def test_between_the_two_nearest_doors_is_between_these(client: Client) -> None:
     first, second, *_ = await _ways(client, ["all doors"])
     asked = await _goal(client, "between the two nearest doors")

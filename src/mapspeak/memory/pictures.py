@@ -11,7 +11,7 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import LaserRing
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, CameraView, find_half_view_rad
 
-MOST_PICTURES = 500
+MOST_PICTURES = 2000
 """Number of pictures that can be referred to; older ones are forgotten here, kept or not."""
 BESIDE_RAD = math.radians(10.0)
 """Margin for things cut by the edge: their middle is beside the picture, and estimated."""

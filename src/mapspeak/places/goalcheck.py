@@ -102,7 +102,7 @@ def check_goal(
         return check
     nearest = _find_nearest(grid, distances, goal)
     is_apart = (
-        check.verdict is GoalVerdict.UNREACHABLE
+        check.verdict in (GoalVerdict.UNREACHABLE, GoalVerdict.CLOSED)
         and nearest is not None
         and not is_in_sight(grid, nearest.point, goal.point, own_m=0.0)
     )

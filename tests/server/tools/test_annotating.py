@@ -1,6 +1,7 @@
 """What `write_semantic_data` makes of what it is given, through a client."""
 
 import math
+import re
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -491,3 +492,31 @@ async def test_a_range_that_was_read_off_the_caption_is_the_one_that_was_measure
         await write(client, {"label": "sink", "bearing_deg": 18, "range_m": 1.8})
     (sink,) = stored(tmp_path).landmarks
     assert sink.range_from == "fake detector"
+
+
+async def test_which_of_several_things_of_a_picture_is_meant_is_asked_for(tmp_path: Path) -> None:
+    robot = seen_by_the_robot(("sink", 12.0, 1.8), ("sink", -30.0, 0.9), ("tap", 12.0, 1.8))
+    async with connect(robot, tmp_path) as client:
+        await look(client)
+        answer = await write(
+            client, {"label": "sink", "picture": "P1"}, {"label": "tap", "picture": "P1"}
+        )
+    sink, tap = stored(tmp_path).landmarks
+    assert (sink.bearing_rad, degrees(tap.bearing_rad)) == (None, pytest.approx(12.0))
+    (warning,) = answer["warnings"]
+    assert warning.startswith("P1 shows 2 called 'sink': give bearing_deg of the one")
+
+
+async def test_a_thing_may_be_seen_in_a_kept_picture_of_an_earlier_run(tmp_path: Path) -> None:
+    async with connect(seen_by_the_robot(), tmp_path, guard=make_guard(tmp_path)) as client:
+        await look(client)
+    robot = FakeRobot(two_rooms(), pose=Pose(5.0, 1.4))
+    toolsets = ("paper", "memory")
+    async with connect(robot, tmp_path, toolsets=toolsets, guard=make_guard(tmp_path)) as client:
+        recalled = text_of(await client.call_tool("recall_episodes", {}))
+        (picture,) = re.findall(r"\bo[0-9a-f]{12}\b", recalled)
+        answer = await write(
+            client, {"label": "sink", "picture": picture, "bearing_deg": 5}, x=5.0, y=1.4
+        )
+    assert answer["refused"] == []
+    assert stored(tmp_path).landmarks[0].pose == START

@@ -189,6 +189,32 @@ async def test_what_is_written_down_comes_before_what_was_only_reported(tmp_path
     assert "T1 at (" in goal["reason"]
 
 
+async def test_of_what_is_written_down_no_pictures_of_an_earlier_run_are_told(
+    tmp_path: Path,
+) -> None:
+    async with visiting(tmp_path) as visit:
+        await visit.look_at_all()
+        for x, y, at in ((6.5, 1.0, EXTINGUISHER), (2.0, 1.5, SOUTH)):
+            here = Point(x, y)
+            thing = {
+                "label": "fire extinguisher",
+                "bearing_deg": 0,
+                "range_m": here.distance_to(at),
+            }
+            await visit.report(
+                "write_semantic_data",
+                name=f"at {x}",
+                description="",
+                functional_landmarks=[thing],
+                x=x,
+                y=y,
+                yaw_deg=math.degrees(here.bearing_to(at)),
+            )
+        advice = (await visit.report("find_place", query="tool for a fire"))["advice"]
+    assert "The likeliest is T" in advice
+    assert "Not written down" not in advice
+
+
 async def test_a_lone_far_picture_that_the_map_contradicts_gives_no_place(tmp_path: Path) -> None:
     async with visiting(tmp_path) as visit:
         await visit.look(1.5, 0.5, ("ladder", Point(7.4, 0.5)))

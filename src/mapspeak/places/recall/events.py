@@ -32,10 +32,12 @@ from mapspeak.worldmodel.keepout import (
     outlines_of_region,
 )
 from mapspeak.worldmodel.model import WorldModel
+from mapspeak.worldmodel.remembered import RememberedPlace
 from mapspeak.worldmodel.revision import STEP_M, Hindrance, MapRevision
 
 SPOT_RADIUS_M = 0.5
 """An event at a point takes this much floor around it."""
+AROUND = f"{SPOT_RADIUS_M} m around "
 REST_RATIO = 0.1
 """A room is cut off when at most this share of its reachable floor is left, at its door."""
 AVOID_FACTOR, AVOID_EXTRA_M = 10.0, 20.0
@@ -347,13 +349,22 @@ def _outline(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
     return _outlines_of(rooms, place.thing) or (around,)
 
 
+def find_region_around(world: WorldModel, event: Event) -> str | None:
+    """Return the region in which an event takes a spot alone, by id; None for other events."""
+    is_spot = event.at is not None and event.place.startswith(AROUND)
+    return world.find_room_id(event.at) if is_spot else None
+
+
 def _name_of(place: Place, words: str, effect: Effect) -> str:
     """Return the id with the words that were used for it, where these are others.
 
     What has no extent of its own tells how much floor is taken around it.
     """
     said = words.strip()
-    if isinstance(place.thing, Spot) and not place.reason:
+    if isinstance(place.thing, RememberedPlace):
+        # It is called so, however it was spelt.
+        said = name = place.thing.waypoint.name
+    elif isinstance(place.thing, Spot) and not place.reason:
         said = name = _say_point(place.point)
     else:
         name = place.name
@@ -361,7 +372,7 @@ def _name_of(place: Place, words: str, effect: Effect) -> str:
     if effect is Effect.NONE or isinstance(place.thing, (Region, Door)):
         return named
     at = "" if name == named == _say_point(place.point) else f" at {_say_point(place.point)}"
-    return f"{SPOT_RADIUS_M} m around {named}{at}"
+    return f"{AROUND}{named}{at}"
 
 
 def _say_point(point: Point) -> str:

@@ -363,7 +363,10 @@ FORMS: tuple[tuple[str, Read], ...] = (
         if kind in (Kind.ROOM, Kind.CORRIDOR, Kind.OPEN_SPACE)
     ),
     *(
-        (rf"{ALL} (?:{words})s?(?: (?:of|in) (?P<at>.+))?", _read_all(kind))
+        (
+            rf"(?:{ALL} (?:{words})s?|{THE}(?:{words})s)(?: (?:of|in|into) (?P<at>.+))?",
+            _read_all(kind),
+        )
         for kind, words in KINDS.items()
     ),
     (

@@ -30,7 +30,8 @@ CLASSES = {
     Kind.OPEN_SPACE: (RoomClass.OPEN_SPACE,),
 }
 SIZED_CLASSES = {**CLASSES, Kind.ROOM: (RoomClass.ROOM, RoomClass.OPEN_SPACE)}
-"""A large room is an open space: it counts where all rooms are meant, or their sizes."""
+"""A large room is an open space: it counts where all rooms are meant, or their sizes, or more than
+there are others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +144,8 @@ def _rank(
         ranked, left_out = _sort_by_size(world, words)
     else:
         ranked, left_out = _sort_by_way(world, words, start)
+        if len(ranked) < n_wanted:
+            ranked, left_out = _sort_by_way(world, words, start, SIZED_CLASSES)
     if not ranked and len(left_out) == 1:
         ranked, left_out = left_out, []
     n_all = len(ranked) + len(left_out)
@@ -179,7 +182,8 @@ def _say_too_few(world: WorldModel, words: Words, n_found: int, n_all: int) -> s
         verdict = str(world.frontiers.verdict).replace("_", " ")
         return f"There is no frontier to go to: {verdict}."
     # What ways are measured from does not count.
-    noun = f"{'other ' if n_all < len(_list(world, words)) else ''}{words.kind or 'thing'}"
+    is_other = n_all < len(_list(world, words, SIZED_CLASSES))
+    noun = f"{'other ' if is_other else ''}{words.kind or 'thing'}"
     called = "" if words.kind else f" called {words.label[:80]!r}"
     one, several = f"{noun}{called}", f"{noun}s{called}"
     if n_found < n_all:
@@ -191,7 +195,10 @@ def _say_too_few(world: WorldModel, words: Words, n_found: int, n_all: int) -> s
 
 
 def _sort_by_way(
-    world: WorldModel, words: Words, start: Referent | None
+    world: WorldModel,
+    words: Words,
+    start: Referent | None,
+    classes: Mapping[Kind, tuple[RoomClass, ...]] = CLASSES,
 ) -> tuple[list[Ranked], list[Ranked]]:
     """Return things that can be reached by their metres by path, and those that cannot.
 
@@ -202,7 +209,7 @@ def _sort_by_way(
         distances = world.map.distances_from(stands_at(world, start))
         own = start.place and start.place.thing
     ranked, left_out = [], []
-    for each in _list(world, words):
+    for each in _list(world, words, classes):
         if each is own:
             continue
         way_m = _measure_way(world, each, distances)

@@ -10,13 +10,15 @@ from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
 from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.places.candidate import RecallCandidate
 from mapspeak.places.naming import ARTICLE, ID, IDS, MOST_NAMED, find_elsewhere
-from mapspeak.places.relations.grammar import Several, Superlative, parse_relation
-from mapspeak.places.relations.vocabulary import COUNTS, ORDERS, RANKS, Kind
+from mapspeak.places.relations.grammar import KINDS, Several, Superlative, parse_relation
+from mapspeak.places.relations.vocabulary import COUNTS, ORDERS, RANKS, Kind, pattern
 from mapspeak.spatial.rooms import RoomClass
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.reported import list_reported
 
 MOST_GUESSES = 3
+OF_THE_MAP = pattern(rf"\b(?:{KINDS[Kind.DOOR]}|{KINDS[Kind.CORRIDOR]}|frontier)s?\b")
+"""Who speaks of these means no place in whose description one of them stands."""
 
 
 def no_such_place(world: WorldModel, words: str) -> GoalError:
@@ -98,12 +100,13 @@ def _guess(world: WorldModel, wanted: str) -> tuple[RecallCandidate, ...]:
     return tuple(
         each
         for each in recalled.candidates
-        if not (is_bare and _is_like_in_meaning(each) and each.kind is EntryKind.THING)
+        if not (is_bare and _is_by(each, Basis.MEANING) and each.kind is EntryKind.THING)
+        and not (OF_THE_MAP.search(wanted) and _is_by(each, Basis.WORDS))
     )
 
 
-def _is_like_in_meaning(candidate: RecallCandidate) -> bool:
-    return candidate.match is not None and candidate.match.basis is Basis.MEANING
+def _is_by(candidate: RecallCandidate, basis: Basis) -> bool:
+    return candidate.match is not None and candidate.match.basis is basis
 
 
 MOST_PHRASES = 3
@@ -173,7 +176,7 @@ def _list_phrases(world: WorldModel, wanted: str) -> Iterator[str]:
 def _say_guesses(guesses: Sequence[RecallCandidate]) -> str:
     """Name what may be meant, for the reader to confirm: likeness alone does not make a goal."""
     first = guesses[0]
-    by = "meaning" if _is_like_in_meaning(first) else "words"
+    by = "meaning" if _is_by(first, Basis.MEANING) else "words"
     told = ", ".join(map(_say_guess, guesses))
     return (
         f"Nothing remembered is called so; nearest in {by}: {told}. If {first.id} is meant, "

@@ -8,6 +8,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.things.approach import COMFORT_M, FACED_M, LARGEST_OFF_M
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.goalcheck import check_goal
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, choose_goal, find_place
@@ -50,7 +51,7 @@ BEYOND_M = 1.0
 LEAST_NEW_M = 0.5
 """Where no heading shows more new wall of a room, it is shown as a whole."""
 NEARER_M = 0.6
-"""From so much nearer than the best place the same is shown."""
+"""A picture from so much nearer may miss what hangs high."""
 MOVED_M = 1.0
 """A place farther from a goal is another one."""
 Face = Callable[[WorldModel, Pose, Sequence[CameraView]], Pose]
@@ -102,9 +103,28 @@ def _shows_as_well(world: WorldModel, place: Place, there: Pose, half_view_rad: 
     shown, best = (measure_shown(world, place, pose, half_view_rad) for pose in (here, there))
     if not shown or best is None:
         return False
+    near_m = max(place.point.distance_to(there.point), FACED_M)
+    is_near = place.point.distance_to(here.point) <= near_m
+    return is_near and shown >= GOOD_RATIO * best and not is_missed_from_near(world, place)
+
+
+def is_missed_from_near(world: WorldModel, place: Place) -> bool:
+    """Return True where a picture from nearer than a thing was seen does not show it.
+
+    By the robot's detector, from where the robot stands: the thing may hang above the picture.
+    """
+    here = world.robot
+    there = None if not isinstance(place.thing, RememberedThing) else _look_from(world, place.thing)
+    if there is None:
+        return False
     there_m, here_m = (place.point.distance_to(pose.point) for pose in (there, here))
-    is_near = there_m - NEARER_M <= here_m <= max(there_m, FACED_M)
-    return is_near and shown >= GOOD_RATIO * best
+    label = place.thing.thing.label
+    return here_m < there_m - NEARER_M and any(
+        is_there(each.pose, here)
+        and each.reported is not None
+        and not any(name_the_same(label, seen) for seen in each.reported)
+        for each in world.pictures
+    )
 
 
 def is_there(robot: Pose, pose: Pose) -> bool:

@@ -17,6 +17,7 @@ from mapspeak.places.recall.events import (
     find_also_closed,
     find_cut_off,
     find_on_way,
+    find_region_around,
 )
 from mapspeak.server.text.episodes import OBSERVED
 from mapspeak.server.text.findings import say_finding, say_trust
@@ -140,6 +141,8 @@ def say_consequences(world: WorldModel, event: Event, now: datetime, drive: Driv
     if closes_robot_in(world, event, now):
         return "The robot stands inside: it has to drive out before that begins."
     told, cut_off = [say_also_closed(world, event, now)], find_cut_off(world, event, now)
+    if region_id := find_region_around(world, event):
+        told.append(f"That is not all of {region_id}: for all of it give {region_id} as place.")
     if drive is not None and (means := find_on_way(world, event, drive.goal.point, now)):
         told.append(ON_WAY[means].format(f"{drive.goal_id} to {drive.place}"))
     if cut_off:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.memory import PictureBook
 from mapspeak.memory.quoting import name_key, quote, quote_name
@@ -14,6 +15,9 @@ from mapspeak.places.candidate import RecallCandidate, RecallDoubt
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.undescribed import UndescribedPicture
+from mapspeak.places.relations.choosing import find_places
+from mapspeak.places.relations.grammar import Several, Superlative, parse_relation
+from mapspeak.places.relations.vocabulary import Kind
 from mapspeak.server.text.findings import say_guess
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import list_some, say_count
@@ -95,6 +99,23 @@ def say_advice(recalled: Recall) -> str:
         return said
     names = ", ".join(quote_name(each.name) for each in elsewhere)
     return f"{said} On another map it is remembered: {names}. {lead(ELSEWHERE)}".rstrip()
+
+
+def say_phrase(world: WorldModel, words: str) -> str:
+    """Say which rooms, doors or frontiers a phrase such as "smallest room" means; empty for others.
+
+    It is read off the map: nothing has to be remembered of it.
+    """
+    relation = parse_relation(words)
+    is_of_map = isinstance(relation, Superlative | Several) and relation.kind is not None
+    if not is_of_map or relation.kind is Kind.REMEMBERED:
+        return ""
+    try:
+        ids = [each.thing.id for each in find_places(world, words)]
+    except GoalError:
+        return ""
+    said = f"{quote(words)} is {list_some(ids, most=MOST_ELSEWHERE)} on the map."
+    return f"{said} {lead('{navigate_to} and {measure} take such words.')}".rstrip()
 
 
 def _say_verdict(recalled: Recall) -> str:

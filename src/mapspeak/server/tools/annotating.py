@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -118,13 +118,17 @@ class Annotator:
         pictures: The pictures that can be spoken of.
         described: The one that the place is described from.
         laser: The present ranges of the robot's laser; None where not asked for, or without one.
+        earlier: Pictures that landmarks name and that the book holds no more, by what they name.
         refused: What stays out, each with its reason; filled as landmarks are taken.
+        remarks: What is remembered without a direction, each with its reason; filled likewise.
     """
 
     pictures: PictureBook
     described: TakenPicture | None = None
     laser: LaserRing | None = None
+    earlier: Mapping[str, TakenPicture] = field(default_factory=dict)
     refused: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
     def find_origin(
         self, safety: Landmarks | None, functional: Landmarks | None
@@ -231,7 +235,10 @@ class Annotator:
         bearing_from = None if thing.image_column_px is None else READ_OFF
         stood = pose if own is None else own.pose
         range_m, range_from = thing.range_m, None
-        measured = _find_measured(thing, bearing_rad, stood, own or picture)
+        shown = own or picture
+        if bearing_rad is None and shown is not None:
+            self._remark_several(thing.label, shown)
+        measured = _find_measured(thing, bearing_rad, stood, shown)
         if measured is not None:
             point, range_from = measured
             range_m = stood.point.distance_to(point)
@@ -250,9 +257,18 @@ class Annotator:
             picture=None if other is None else other.name,
             stamp_s=None if other is None else other.stamp_s,
             recorded_at=None if other is None else other.recorded_at,
-            laser=self._laser_around(stood, bearing_rad, own or picture),
+            laser=self._laser_around(stood, bearing_rad, shown),
         )
         return landmark if own is None else noted_at(landmark, own.pose, pose)
+
+    def _remark_several(self, label: str, shown: TakenPicture) -> None:
+        """Remark that a picture does not tell which of several things of a name is meant."""
+        n_called = sum(name_the_same(each.label, label) for each in shown.readings)
+        if n_called > 1:
+            self.remarks.append(
+                f"{shown.id} shows {n_called} called {label!r}: give bearing_deg of the one that "
+                "is meant; it is noted without a direction."
+            )
 
     def _laser_around(
         self, stood: Pose, bearing_rad: float | None, picture: TakenPicture | None
@@ -276,7 +292,7 @@ class Annotator:
 
     def _find_picture(self, thing: LandmarkInput) -> TakenPicture | None:
         if thing.picture is not None:
-            return self.pictures.find(thing.picture)
+            return self.pictures.find(thing.picture) or self.earlier.get(thing.picture)
         return None if thing.image_column_px is None else self.described or self.pictures.latest
 
     def _no_such_picture(self, said: str) -> SemanticMapError:
@@ -299,6 +315,11 @@ def check_name(name: str) -> None:
     if fault:
         hint = "Give a name in words, such as 'dock corner'."
         raise SemanticMapError(f"{name[:80]!r} {fault}", hint=hint)
+
+
+def list_pictures_named(*given: Landmarks | None) -> set[str]:
+    """Return what landmarks call the pictures that show them."""
+    return {thing.picture for thing in _things(given) if thing.picture is not None}
 
 
 def _things(given: Iterable[Landmarks | None]) -> Iterator[LandmarkInput]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Annotated, Any
 
@@ -41,6 +42,7 @@ from mapspeak.server.tools.annotating import (
     Safety,
     SeenIn,
     check_name,
+    list_pictures_named,
 )
 from mapspeak.server.tools.sightings import fetch_ring, find_taken, find_undescribed_pictures
 from mapspeak.server.tools.toolset import ToolEffect, tool
@@ -172,7 +174,8 @@ class PaperTools:
         check_name(place.name)
         await self._session.meet_map()
         described = await find_taken(self._session, place.picture)
-        annotator = Annotator(pictures=self._session.pictures, described=described)
+        earlier = await self._find_earlier(safety_landmarks, functional_landmarks)
+        annotator = Annotator(pictures=self._session.pictures, described=described, earlier=earlier)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
         here, doubt = await self._find_robot()
         seen_at = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
@@ -200,7 +203,8 @@ class PaperTools:
         far = await self._say_far(receipt) + await self._forget_gone(gone, merge, seen_at)
         moved = await say_moved(session.compute(session.keeper.compare))
         places = await session.compute(memory.read)
-        told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
+        told = filter(None, (*annotator.remarks, *far, unsure, kept.fault, moved))
+        refused = annotator.refused
         answer = WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
         return await self._with_things(answer, receipt.waypoint.name)
 
@@ -243,6 +247,15 @@ class PaperTools:
     async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
         here = await self._session.robot.fetch_pose()
         return here.pose, here.find_doubt(self._session.robot.now_s)
+
+    async def _find_earlier(self, *given: Landmarks | None) -> dict[str, TakenPicture]:
+        """Return pictures that landmarks name, kept ones of earlier among them, by those names."""
+        found: dict[str, TakenPicture] = {}
+        for named in list_pictures_named(*given):
+            with suppress(SemanticMapError):
+                taken = await find_taken(self._session, named)
+                found |= {} if taken is None else {named: taken}
+        return found
 
     async def _add_laser(
         self,

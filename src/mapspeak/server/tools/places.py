@@ -22,6 +22,7 @@ from mapspeak.server.reports.memory import RecallAnswer
 from mapspeak.server.reports.robot import GoalAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.moments import read_past
+from mapspeak.server.text.recall import say_phrase
 from mapspeak.server.text.world.descriptions import describe_place
 from mapspeak.server.text.world.notices import say_elsewhere
 from mapspeak.server.text.world.reported import say_reported
@@ -179,6 +180,8 @@ class FindTools:
             answer = leave_out_beside(recall(world, wanted))
             warnings = self._say_warnings(world, query, now)
             report = RecallAnswer.of(answer, now=now, picture_ids=ids, warnings=warnings)
+            if meant := say_phrase(world, query):
+                return report.model_copy(update={"advice": meant})
             if now is None:
                 return report
             store, find = session.episodes.store, session.find_episodes

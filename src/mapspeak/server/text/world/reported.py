@@ -12,6 +12,7 @@ from mapspeak.memory.episodes.store import EpisodeStore
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.asking import Recall, RecallQuery
 from mapspeak.places.recall.reported import Reported, find_reported
 from mapspeak.places.standing import stand_before
@@ -69,13 +70,18 @@ def say_reported(
     try:
         known = store.list_labels()
         earlier = world.recollector.reports.index.find_meant(query.words, known)
-        if shown := _leave_out(earlier):
+        if shown := _leave_out(_not_written_down(world, earlier)):
             return _say_pictures(world, find, query, shown, now)
     except SemanticMapError:
         # What cannot be read costs no answer about what is remembered.
         return ""
     is_none = answer.verdict is Verdict.NOT_REMEMBERED and not meant
     return say_labels(query.words, labels or known) if is_none else ""
+
+
+def _not_written_down(world: WorldModel, labels: Iterable[str]) -> list[str]:
+    written = {each.thing.label for each in world.things}
+    return [each for each in labels if not any(name_the_same(each, name) for name in written)]
 
 
 def _leave_out(labels: Iterable[str]) -> list[str]:
