@@ -64,8 +64,8 @@ def test_the_name_of_a_picture_is_its_own_in_every_run() -> None:
 
 def test_old_pictures_are_forgotten() -> None:
     book = PictureBook()
-    for _ in range(600):
+    for _ in range(2100):
         taken(book)
 
     assert book.find("P1") is None
-    assert book.find("P600") is not None
+    assert book.find("P2100") is not None

@@ -61,6 +61,7 @@ def test_for_a_closed_place_no_pose_on_the_other_side_of_its_wall_is_offered() -
     with pytest.raises(GoalError, match="closed by event E2") as caught:
         choose_goal(world_on(revision_with(north)), place=None, x=8.9, y=9.0, yaw_deg=None)
     assert "nearest pose" not in caught.value.hint
+    assert caught.value.step is NextStep.END_EVENT
 
 
 def test_closed_floor_is_as_far_from_obstacles_as_it_was() -> None:

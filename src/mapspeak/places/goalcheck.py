@@ -306,7 +306,7 @@ def say_instead(check: GoalCheck, *, has_heading: bool = False) -> tuple[str, Ne
     Args:
         has_heading: The heading was asked for, so it is said too.
     """
-    if check.verdict is GoalVerdict.UNREACHABLE and check.areas:
+    if check.areas and (check.verdict is GoalVerdict.UNREACHABLE or check.is_nearest_apart):
         return _say_wait(check.areas[0])
     near = check.nearest
     if near is None or check.is_nearest_apart:
