@@ -351,8 +351,9 @@ def _outline(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
 
 def find_region_around(world: WorldModel, event: Event) -> str | None:
     """Return the region in which an event takes a spot alone, by id; None for other events."""
-    is_spot = event.at is not None and event.place.startswith(AROUND)
-    return world.find_room_id(event.at) if is_spot else None
+    if event.at is None or not event.place.startswith(AROUND):
+        return None
+    return world.find_room_id(event.at)
 
 
 def _name_of(place: Place, words: str, effect: Effect) -> str:

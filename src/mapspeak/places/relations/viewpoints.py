@@ -113,12 +113,14 @@ def is_missed_from_near(world: WorldModel, place: Place) -> bool:
 
     By the robot's detector, from where the robot stands: the thing may hang above the picture.
     """
-    here = world.robot
-    there = None if not isinstance(place.thing, RememberedThing) else _look_from(world, place.thing)
+    here, remembered = world.robot, place.thing
+    if not isinstance(remembered, RememberedThing):
+        return False
+    there = _look_from(world, remembered)
     if there is None:
         return False
     there_m, here_m = (place.point.distance_to(pose.point) for pose in (there, here))
-    label = place.thing.thing.label
+    label = remembered.thing.label
     return here_m < there_m - NEARER_M and any(
         is_there(each.pose, here)
         and each.reported is not None

@@ -107,11 +107,11 @@ def say_phrase(world: WorldModel, words: str) -> str:
     It is read off the map: nothing has to be remembered of it.
     """
     relation = parse_relation(words)
-    is_of_map = isinstance(relation, Superlative | Several) and relation.kind is not None
-    if not is_of_map or relation.kind is Kind.REMEMBERED:
+    kind = relation.kind if isinstance(relation, Superlative | Several) else None
+    if kind in (None, Kind.REMEMBERED):
         return ""
     try:
-        ids = [each.thing.id for each in find_places(world, words)]
+        ids = [each.name for each in find_places(world, words)]
     except GoalError:
         return ""
     said = f"{quote(words)} is {list_some(ids, most=MOST_ELSEWHERE)} on the map."
