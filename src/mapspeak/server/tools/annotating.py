@@ -20,7 +20,6 @@ from mapspeak.memory import (
     LaserFan,
     LaserRing,
     PictureBook,
-    PictureReading,
     TakenPicture,
     Waypoint,
     find_concern,
@@ -32,9 +31,7 @@ from mapspeak.memory import (
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.naming import is_taken_name
 from mapspeak.server.text.offered import lead
-
-SAME_BEARING_RAD = math.radians(20.0)
-"""A direction read off a picture and one that was measured differ by less 19 times in 20."""
+from mapspeak.server.tools.sightings import find_reading
 
 SAME_RANGE_M = 0.1
 """A told range this close to a measured one was read off it."""
@@ -365,7 +362,7 @@ def _find_measured(
     """
     if picture is None:
         return None
-    reading = _find_reading(thing.label, stood, bearing_rad, picture)
+    reading = find_reading(thing.label, stood, bearing_rad, picture)
     if reading is None or reading.range_m is None:
         return None
     point = picture.pose.point_at(reading.bearing_rad, reading.range_m)
@@ -373,23 +370,6 @@ def _find_measured(
     if thing.range_m is not None and abs(thing.range_m - measured_m) > SAME_RANGE_M:
         return None
     return point, reading.source
-
-
-def _find_reading(
-    label: str, stood: Pose, bearing_rad: float | None, picture: TakenPicture
-) -> PictureReading | None:
-    """Return what was measured of a thing of that name, in a direction from a pose or in all."""
-    measured = (each for each in picture.readings if each.range_m is not None)
-    called = [each for each in measured if name_the_same(each.label, label)]
-    if bearing_rad is None:
-        return called[0] if len(called) == 1 else None
-    way_rad = stood.yaw_rad + bearing_rad - picture.pose.yaw_rad
-    found = [
-        (off_rad, number)
-        for number, reading in enumerate(called)
-        if (off_rad := abs(wrap_angle(reading.bearing_rad - way_rad))) <= SAME_BEARING_RAD
-    ]
-    return called[min(found)[1]] if found else None
 
 
 def _require_possible(thing: LandmarkInput, picture: TakenPicture | None) -> None:

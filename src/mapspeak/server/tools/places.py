@@ -9,7 +9,7 @@ from pydantic import Field
 from mapspeak.driving.drivereport import find_failed
 from mapspeak.errors import GoalError
 from mapspeak.memory.search.answer import EntryKind
-from mapspeak.places.asking import RecallQuery, leave_out_beside, recall
+from mapspeak.places.asking import Recall, RecallQuery, leave_out_beside, recall
 from mapspeak.places.recall.events import (
     find_events_at,
     find_speaking_events,
@@ -180,13 +180,7 @@ class FindTools:
             answer = leave_out_beside(recall(world, wanted))
             warnings = self._say_warnings(world, query, now)
             report = RecallAnswer.of(answer, now=now, picture_ids=ids, warnings=warnings)
-            if meant := say_phrase(world, query):
-                return report.model_copy(update={"advice": meant})
-            if now is None:
-                return report
-            store, find = session.episodes.store, session.find_episodes
-            seen = say_reported(world, store, find, answer, now=now)
-            advice = f"{report.advice} {seen}".rstrip()
+            advice = say_phrase(world, query) or self._say_seen(world, answer, report, now)
             return report.model_copy(update={"advice": advice})
 
         report = await session.compute(ask)
@@ -198,6 +192,15 @@ class FindTools:
             content=[TextContent(type="text", text=report.text)],
             structured_content=report.model_dump(mode="json"),
         )
+
+    def _say_seen(
+        self, world: WorldModel, answer: Recall, report: RecallAnswer, now: datetime | None
+    ) -> str:
+        """Return the advice with what the detector reported and nobody wrote down."""
+        if now is None:
+            return report.advice
+        store, find = self._session.episodes.store, self._session.find_episodes
+        return f"{report.advice} {say_reported(world, store, find, answer, now=now)}".rstrip()
 
     def _say_warnings(self, world: WorldModel, query: str, now: datetime | None) -> tuple[str, ...]:
         """Say what a reader should know first; of events those that have to do with a request."""

@@ -13,8 +13,10 @@ from PIL import Image as PictureFile
 from pydantic import Field
 
 from mapspeak.errors import LinkError, SemanticMapError
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import LaserRing, PictureReading, TakenPicture, build_ring
 from mapspeak.memory.episodes.observation import Observation, named_pictures, placed
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.places.recall.nearby import in_rooms_of
 from mapspeak.places.recall.undescribed import UndescribedPicture, find_undescribed
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
@@ -24,6 +26,8 @@ from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
 MOST_SHOWN = 8
+SAME_BEARING_RAD = math.radians(20.0)
+"""A direction read off a picture and one that was measured differ by less 19 times in 20."""
 LEGEND = " (bearing, left positive; range; confidence)"
 Camera = Annotated[str | None, Field(description="by name; else front", max_length=60)]
 
@@ -170,6 +174,23 @@ async def find_taken(session: Session, said: str | None) -> TakenPicture | None:
         horizontal_fov_rad=None,
         reported=seen.labels or None,
     )
+
+
+def find_reading(
+    label: str, stood: Pose, bearing_rad: float | None, picture: TakenPicture
+) -> PictureReading | None:
+    """Return what was measured of a thing of that name, in a direction from a pose or in all."""
+    measured = (each for each in picture.readings if each.range_m is not None)
+    called = [each for each in measured if name_the_same(each.label, label)]
+    if bearing_rad is None:
+        return called[0] if len(called) == 1 else None
+    way_rad = stood.yaw_rad + bearing_rad - picture.pose.yaw_rad
+    found = [
+        (off_rad, number)
+        for number, reading in enumerate(called)
+        if (off_rad := abs(wrap_angle(reading.bearing_rad - way_rad))) <= SAME_BEARING_RAD
+    ]
+    return called[min(found)[1]] if found else None
 
 
 def _measure_width_px(path: Path) -> int:

@@ -11,12 +11,7 @@ from mapspeak.places.goalcheck import is_in_obstacle, say_check
 from mapspeak.places.naming import Place
 from mapspeak.places.recall.reported import count_in_region
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
-from mapspeak.places.relations.viewpoints import (
-    Sight,
-    find_sights,
-    is_missed_from_near,
-    measure_shown,
-)
+from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
 from mapspeak.places.ways import find_own_point
 from mapspeak.robot import CameraPicture
 from mapspeak.server.text.findings import say_conflict, say_finding, say_guess, say_support
@@ -32,7 +27,12 @@ from mapspeak.server.text.wording import (
     shorten,
 )
 from mapspeak.server.text.world.maps import say_doubtful_door, say_merits, say_size
-from mapspeak.server.text.world.notices import say_direction, say_fit, say_off
+from mapspeak.server.text.world.notices import (
+    say_check_of_thing,
+    say_direction,
+    say_fit,
+    say_off,
+)
 from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
 from mapspeak.spatial.fieldofview import HALF_VIEW_RAD, SIGHT_M
 from mapspeak.spatial.frontiers import Frontier
@@ -45,14 +45,6 @@ MOST_VIEWS = 12
 LOW_RATIO = 0.5
 ALL_RATIO = 0.995
 MOST_SIGHTS = 12
-CHECK = (
-    "Is it there? {write_semantic_data} notes it from this picture; "
-    "what is not there any more is given as gone."
-)
-FROM_FARTHER = (
-    "It is not reported from so near and may hang above the picture: {look_at} again looks from as "
-    "far as it was seen."
-)
 
 
 def say_landmark(landmark: Landmark) -> str:
@@ -377,7 +369,7 @@ def describe_view(world: WorldModel, place: Place, picture: CameraPicture) -> st
     if isinstance(thing := place.thing, RememberedThing):
         is_told = thing.thing.position is None or thing.id in {each.id for each in sights}
         lines += [] if is_told else [f"{say_off(picture.pose.point, thing)}."]
-        lines.append(lead(FROM_FARTHER if is_missed_from_near(world, place) else CHECK))
+        lines.append(say_check_of_thing(world, place))
     return "\n".join(filter(None, lines))
 
 

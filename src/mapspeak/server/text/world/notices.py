@@ -5,7 +5,10 @@ import math
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import tell_place
+from mapspeak.places.naming import Place
+from mapspeak.places.relations.viewpoints import is_missed_from_near
 from mapspeak.places.standing import find_standing_point
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count, say_pose_doubt, shorten
 from mapspeak.spatial.rooms import Door
 from mapspeak.worldmodel.keepout import ClosedArea, ClosedFloor
@@ -117,3 +120,18 @@ def say_explored(world: WorldModel) -> str:
 def _round(area_m2: float) -> str:
     """Return an estimate with the one or two digits that it is good for."""
     return f"{area_m2:.1f}" if area_m2 < 1 else f"{float(f'{area_m2:.2g}'):.0f}"
+
+
+CHECK = (
+    "Is it there? {write_semantic_data} notes it from this picture; "
+    "what is not there any more is given as gone."
+)
+FROM_FARTHER = (
+    "It is not reported from so near and may hang above the picture: {look_at} again looks from as "
+    "far as it was seen."
+)
+
+
+def say_check_of_thing(world: WorldModel, place: Place) -> str:
+    """Say what to do with a picture that should show a remembered thing."""
+    return lead(FROM_FARTHER if is_missed_from_near(world, place) else CHECK)
