@@ -4,6 +4,10 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
+from mapspeak.spatial.rooms.finding import find_openings, join_corridors, measure_regions
+from mapspeak.spatial.rooms.floor import build_floor
+from mapspeak.spatial.rooms.raster import build_raster
+from mapspeak.spatial.rooms.segmentation import Segmentation
 
 CELL_M = 0.25
 
@@ -174,3 +178,21 @@ def test_a_room_beside_others_that_lead_to_each_other_is_no_corridor() -> None:
         rows[row] = "    #.......................................#"
 
     assert {region.room_class for region in divided("\n".join(rows)).regions} == {RoomClass.ROOM}
+
+
+def _join_halves(high: int, wide: int) -> int:
+    """Return how many regions remain of a floor that was cut in the middle, where nothing is."""
+    cells = np.full((high + 8, wide + 8), 100, np.int8)
+    cells[4:-4, 4:-4] = 0
+    raster = build_raster(OccupancyGrid(cells=cells, resolution_m=0.05))
+    floor = build_floor(raster)
+    labels = floor.floor.astype(np.int32)
+    labels[:, labels.shape[1] // 2 :] *= 2
+    cut = Segmentation(raster=raster, floor=floor, labels=labels, doubts={})
+    joined = join_corridors(cut, measure_regions(cut), find_openings(cut))
+    return int(joined.labels.max())
+
+
+def test_two_short_strips_that_nothing_narrows_between_are_one() -> None:
+    assert _join_halves(40, 232) == 1
+    assert _join_halves(100, 232) == 2

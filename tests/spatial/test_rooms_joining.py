@@ -121,6 +121,43 @@ def test_a_judge_that_joins_nothing_leaves_nothing_too_small_for_a_room(
     assert (rooms > 0).sum() == floor.floor.sum()
 
 
+CORRIDORS = """
+    ##########################################
+    #........................................#
+    #........................................#
+    #........................................#
+    #........................................#
+    #........................................#
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##################......##################
+    ##########################################
+"""
+
+
+@pytest.mark.parametrize(("text", "n_rooms"), [(THREE_ROOMS, 1), (CORRIDORS, 3)])
+def test_two_strips_are_joined_only_where_that_is_surer(text: str, n_rooms: int) -> None:
+    raster = build_raster(grid_from_text(text, resolution_m=CELL_M))
+    floor = build_floor(raster)
+    graph = PlaceGraph(*find_borders(raster, floor, [], np.zeros_like(floor.floor)), raster)
+
+    join_places(graph, lambda measures: np.full(len(measures), 0.47))
+
+    assert number_by_area(graph).max() == n_rooms
+
+
 def test_the_shipped_judge_finds_the_doors(basins: Basins, floor: Floor, raster: Raster) -> None:
     graph = _graph(basins, floor, raster)
 

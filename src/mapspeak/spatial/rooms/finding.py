@@ -13,6 +13,7 @@ from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask, OccupancyGrid, Window
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
+from mapspeak.spatial.rooms.joining import STRIP
 from mapspeak.spatial.rooms.raster import (
     SETTINGS,
     Raster,
@@ -23,8 +24,6 @@ from mapspeak.spatial.rooms.raster import (
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
-STRIP = 3.0
-"""Elongation from which a region is a strip: something to walk along, not a room."""
 BEND = 2 * STRIP
 """Elongation from which a region is a strip on both sides of a bend.
 
@@ -36,8 +35,11 @@ ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""
 HALL_WIDTH_M = 10.0
 """A region at least this wide all along is a hall, wherever it leads."""
-RUN_ON_RATIO = 0.7
-"""A way between two corridors that is as wide as this, beside the wider one, is a bend."""
+RUN_ON_RATIO = 0.75
+"""A way between two corridors that is as wide as this, beside the wider one, is a bend.
+
+Between other strips it is as wide beside both at their widest.
+"""
 OPEN_SPACE_WIDTH_M = 8.0
 OPEN_SPACE_AREA_M2 = 100.0
 
@@ -286,11 +288,14 @@ def join_corridors(
     number = np.arange(len(shapes) + 1)
     for opening in openings:
         one, other = opening.first - 1, opening.second - 1
+        sides = shapes[one], shapes[other]
         if classes[one] is classes[other] is RoomClass.CORRIDOR:
-            width_m = max(walked_size(shapes[i])[1] for i in (one, other))
-            if opening.width_m >= RUN_ON_RATIO * width_m:
-                joined = number[[opening.first, opening.second]]
-                number[number == joined.max()] = joined.min()
+            across_m = max(walked_size(side)[1] for side in sides)
+        else:
+            across_m = max(map(_widest_across, sides))
+        if opening.width_m >= RUN_ON_RATIO * across_m:
+            joined = number[[opening.first, opening.second]]
+            number[number == joined.max()] = joined.min()
     if np.array_equal(number, np.arange(len(number))):
         return segmentation
     labels = number[segmentation.labels]
@@ -304,6 +309,12 @@ def join_corridors(
         if one != other:
             doubts[one, other] = max(share, doubts.get((one, other), 0.0))
     return replace(segmentation, labels=rank[labels], doubts=doubts)
+
+
+def _widest_across(shape: RegionShape) -> float:
+    """Return the largest width of a strip, which may be no corridor by itself, else infinity."""
+    length_m, width_m = walked_size(shape)
+    return 2 * shape.region.clearance_m if length_m > STRIP * width_m else math.inf
 
 
 def classify_all(shapes: list[RegionShape], openings: list[Opening]) -> list[RoomClass]:

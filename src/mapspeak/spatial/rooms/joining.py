@@ -6,6 +6,7 @@ The certainty of a join comes from a sum of small decision trees over the measur
 
 import heapq
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -20,6 +21,14 @@ from mapspeak.spatial.rooms.raster import SETTINGS
 
 Judge = Callable[[FloatArray], FloatArray]
 """Maps measures, shape (n, len(MEASURES)), to the certainty that nothing divides, 0 to 1."""
+STRIP = 3.0
+"""Length over width from which a place is a strip: something to walk along, not a room."""
+JOIN_SHARE, STRIPS_SHARE = 0.45, 0.5
+"""Places are joined that nothing divides with at least this certainty; two strips need more.
+
+Two corridors meet at a bend or a crossing, where no wall and no narrow place divides them.
+"""
+_WALK = MEASURES.index("shorter_log_walk")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -98,12 +107,14 @@ def join_surest(graph: PlaceGraph, judge: Judge, before: IntArray | None = None)
     def judge_anew(pairs: list[tuple[int, int]]) -> None:
         if not pairs:
             return
-        sure = judge(graph.measure(np.array(pairs)))
+        measures = graph.measure(np.array(pairs))
+        are_strips = measures[:, _WALK] > math.log(STRIP)
+        spare = judge(measures) - np.where(are_strips, STRIPS_SHARE, JOIN_SHARE)
         if before is not None:
-            sure = sure + _lean(before[np.array(pairs)])
-        for pair, share in zip(pairs, sure.tolist(), strict=True):
+            spare = spare + _lean(before[np.array(pairs)])
+        for pair, share in zip(pairs, spare.tolist(), strict=True):
             last_judged[pair] = number = last_judged.get(pair, 0) + 1
-            if share >= SETTINGS.join_share:
+            if share >= 0:
                 heapq.heappush(waiting, (-share, *pair, number))
 
     judge_anew(

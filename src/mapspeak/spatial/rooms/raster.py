@@ -39,7 +39,6 @@ class RoomSettings:
         leaf_width_m: A narrower one shows in the clearances.
         stub_m: The shortest piece of wall, in line with such an opening, that is a jamb of it.
         tip_m: The thickest such piece.
-        join_share: Places are joined that nothing divides with at least this certainty.
         keep_share: So much surer must be what divides otherwise than on the map before.
         room_area_m2: Smaller regions belong to their neighbour.
         part_area_m2: The same for a region that is hardly seen yet.
@@ -64,7 +63,6 @@ class RoomSettings:
     leaf_width_m: float = 1.0
     stub_m: float = 0.5
     tip_m: float = 0.25
-    join_share: float = 0.45
     keep_share: float = 0.2
     room_area_m2: float = 1.5
     part_area_m2: float = 0.5
