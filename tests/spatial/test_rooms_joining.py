@@ -149,7 +149,7 @@ CORRIDORS = """
 
 @pytest.mark.parametrize(("text", "n_rooms"), [(THREE_ROOMS, 1), (CORRIDORS, 3)])
 def test_two_strips_are_joined_only_where_that_is_surer(text: str, n_rooms: int) -> None:
-    raster = build_raster(grid_from_text(text, resolution_m=CELL_M))
+    raster = build_raster(grid_from_text(text, resolution_m=2 * CELL_M))
     floor = build_floor(raster)
     graph = PlaceGraph(*find_borders(raster, floor, [], np.zeros_like(floor.floor)), raster)
 

@@ -6,7 +6,6 @@ The certainty of a join comes from a sum of small decision trees over the measur
 
 import heapq
 import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -28,7 +27,10 @@ JOIN_SHARE, STRIPS_SHARE = 0.45, 0.5
 
 Two corridors meet at a bend or a crossing, where no wall and no narrow place divides them.
 """
-_WALK = MEASURES.index("shorter_log_walk")
+_STRIP_M2 = 3.0
+"""A smaller strip is a nook, or what is seen through a gap."""
+_OF_STRIPS = [MEASURES.index(name) for name in ("shorter_log_walk", "smaller_log_area")]
+_LEAST_OF_STRIPS = np.log([STRIP, _STRIP_M2])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -108,7 +110,7 @@ def join_surest(graph: PlaceGraph, judge: Judge, before: IntArray | None = None)
         if not pairs:
             return
         measures = graph.measure(np.array(pairs))
-        are_strips = measures[:, _WALK] > math.log(STRIP)
+        are_strips = (measures[:, _OF_STRIPS] > _LEAST_OF_STRIPS).all(axis=1)
         spare = judge(measures) - np.where(are_strips, STRIPS_SHARE, JOIN_SHARE)
         if before is not None:
             spare = spare + _lean(before[np.array(pairs)])
