@@ -192,6 +192,12 @@ def test_what_somebody_looked_at_and_did_not_name_is_a_weak_finding() -> None:
     assert findings[0].waypoints == ("c",)
 
 
+def test_who_named_a_thing_from_another_spot_of_a_place_did_not_miss_it_there() -> None:
+    beside = Pose(0.5, 2.6, math.radians(-60.0))
+    sink = replace(mark("sink", 60.0, range_m=1.0), pose=beside)
+    assert kinds(place("c", 1.5, 1.2, mark("door", 40.0), mark("window", -40.0), sink)) == []
+
+
 def test_a_record_filed_under_another_room_is_told() -> None:
     rooms = find_rooms(GRID)
     west = rooms.find_region_at(Point(1.5, 1.5))

@@ -373,6 +373,33 @@ def test_a_thing_that_cannot_be_come_near_to_is_gone_to_as_near_as_it_is_in_sigh
     assert "the nearest place in sight of it" in goal.place.reason
 
 
+BEHIND_UNSEEN_FLOOR = """
+    ########################
+    #........??............#
+    #........??............#
+    #........??............#
+    #........??............#
+    ########################
+    """
+
+
+def test_a_thing_that_is_in_sight_from_no_place_is_looked_for_from_the_nearest_that_saw_it() -> (
+    None
+):
+    grid = grid_from_text(BEHIND_UNSEEN_FLOOR, resolution_m=0.5)
+    looks = tuple(
+        Waypoint(
+            name=f"from {x}",
+            pose=Pose(x, 1.5, math.pi),
+            functional_landmarks=(Landmark(label="printer", bearing_rad=0.0, range_m=x - 0.5),),
+        )
+        for x in (11.0, 7.0)
+    )
+    world = WorldModel(grid, looks[0].pose, SemanticMap(waypoints=looks), radius_m=0.3)
+    goal = check_place(world, find_place(world, "printer"))
+    assert goal.pose.x == 7.0
+
+
 BEHIND_A_SLOT_ON_A_WALL = """
     ########################
     #......................#

@@ -157,6 +157,8 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
     records = map(world.recollection.find_place, thing.waypoints)
     poses = [record.waypoint.pose for record in records if record is not None]
     poses = poses or [Pose(view.place.x, view.place.y) for view in thing.supporting]
+    if (at := thing.position) is not None:
+        poses.sort(key=lambda pose: at.distance_to(pose.point))
     pose = next((pose for pose in poses if world.path_m(pose.point) is not None), poses[0])
     if thing.position is None or thing.position == pose.point:
         return pose

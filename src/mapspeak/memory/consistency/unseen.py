@@ -194,7 +194,7 @@ class UnseenThings:
         return looks, np.where(is_ahead[enough], in_sight, 0.0).sum(axis=1) / n_spots
 
     def _is_told(self, thing: Thing, waypoint: Waypoint, bearing_rad: float) -> bool:
-        """Return True when a waypoint names what may be a thing, or counts that it does not.
+        """Return True when a waypoint names what may be a thing, or named it from another spot.
 
         Args:
             bearing_rad: From the waypoint's heading to the thing.
@@ -207,7 +207,7 @@ class UnseenThings:
         }
         named = find_named(waypoint)
         return any(_may_be(thing, each, bearing_rad, owners.get(each)) for each in named) or any(
-            view.waypoint == waypoint.name and view.landmark.n_missed for view in thing.supporting
+            view.waypoint == waypoint.name for view in thing.supporting
         )
 
     def _is_gone(self, thing: Thing) -> bool:
