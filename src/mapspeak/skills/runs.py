@@ -176,15 +176,18 @@ class SkillRun:
     client: str | None
     n_stops_before: int
     questions: QuestionBook
+    read_clock_s: Callable[[], float]
     progress: SkillProgress = field(default_factory=SkillProgress)
     n_progress: int = 0
     outcome: SkillOutcome | None = None
     error: MapspeakError | None = None
-    _begun_s: float = field(default_factory=anyio.current_time)
     _ended_s: float | None = None
     _scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
     _news: anyio.Event = field(default_factory=anyio.Event)
     _why: SkillCode = SkillCode.CANCELLED
+
+    def __post_init__(self) -> None:
+        self._begun_s = self.read_clock_s()
 
     @property
     def is_over(self) -> bool:
@@ -205,8 +208,9 @@ class SkillRun:
 
     @property
     def passed_s(self) -> float:
-        """How long it has taken, or took, in wall time."""
-        return (self._ended_s or anyio.current_time()) - self._begun_s
+        """How long it has taken, or took, in robot time."""
+        now_s = self.read_clock_s() if self._ended_s is None else self._ended_s
+        return max(now_s - self._begun_s, 0.0)
 
     async def do(self, arguments: Arguments) -> None:
         """Run the skill, and keep its outcome or error."""
@@ -222,7 +226,7 @@ class SkillRun:
             logger.exception("The skill %s failed by a mistake in it", self.skill.spec.name)
             self.outcome = SkillOutcome(SkillState.FAILED, SkillCode.LOST)
         finally:
-            self._ended_s = anyio.current_time()
+            self._ended_s = self.read_clock_s()
             self._tell()
 
     async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
@@ -262,9 +266,11 @@ class SkillRuns:
     Attributes:
         count_stops: Changes at each stop of the robot, which ends all runs but those that only
             read.
+        read_clock_s: Robot time.
     """
 
     count_stops: Callable[[], int] = lambda: 0
+    read_clock_s: Callable[[], float] = anyio.current_time
     questions: QuestionBook = field(default_factory=QuestionBook)
     _runs: OrderedDict[str, SkillRun] = field(default_factory=OrderedDict)
     _n_begun: int = 0
@@ -317,6 +323,7 @@ class SkillRuns:
             client=None if isinstance(skill, Mission) else current_caller().session,
             n_stops_before=self.count_stops(),
             questions=self.questions,
+            read_clock_s=self.read_clock_s,
         )
         over = [each.handle for each in self._runs.values() if each.is_over]
         for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:

@@ -34,9 +34,8 @@ from mapspeak.spatial.frontiers import (
 )
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, RoomMap
-from mapspeak.worldmodel.judging import Judge
 from mapspeak.worldmodel.recollection import Recollection, Recollector
-from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing, number_places
+from mapspeak.worldmodel.remembered import Judge, RememberedPlace, RememberedThing, number_places
 from mapspeak.worldmodel.reported import list_reported
 from mapspeak.worldmodel.revision import MapRevision
 

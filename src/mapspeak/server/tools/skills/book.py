@@ -42,7 +42,7 @@ class SkillBook:
         self, session: Session, ros: RosAccess, entries: Sequence[OwnersEntry] = ()
     ) -> None:
         self._ros, self.session = ros, session
-        self.runs = SkillRuns(partial(_count_stops, session))
+        self.runs = SkillRuns(partial(_count_stops, session), lambda: session.robot.now_s)
         self.exposed: dict[str, Skill] = {}
         self._tools: Collection[str] = ()
         self._are_tools = self._is_read_only = False

@@ -92,11 +92,17 @@ class SkillRunTools:
 
 def tell_news(context: Context) -> OnNews:
     """Return the function that reports progress to a caller."""
+    told = ""
 
     async def tell(run: SkillRun) -> None:
-        signs = say_count(run.n_progress, "sign")
-        said = f"{run.handle} {run.state}, {signs} of progress"
-        await context.report_progress(run.passed_s, message=said)
+        nonlocal told
+        signs = f"{say_count(run.n_progress, 'sign')} of progress"
+        # Of a mission a step is told once, however long it goes on.
+        steps = run.progress.account
+        said = f"{run.handle} {run.state}, {steps[-1] if steps else signs}"
+        if said != told:
+            told = said
+            await context.report_progress(run.passed_s, message=said)
 
     return tell
 
