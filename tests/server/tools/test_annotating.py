@@ -194,7 +194,7 @@ async def test_noting_a_place_from_elsewhere_keeps_the_views_that_were_noted_bef
         told = text_of(await client.call_tool("describe_place", {"place": "W1"}))
     assert answer["landmarks"] == [
         'merged "sink": now +40 deg, was seen from elsewhere; 2 views of it',
-        'kept "tap", +5 deg, seen from x 1.50, y 1.40, yaw 0 deg: not named this time',
+        'kept, not named this time: "tap"',
     ]
     sink, earlier, tap = stored(tmp_path).functional_landmarks
     assert (sink.pose, earlier.pose, tap.pose) == (None, START, START)
@@ -309,8 +309,7 @@ async def test_writing_a_name_again_says_what_was_merged_kept_gone_and_replaced(
         'new "door"',
         'merged "Sink": now +12 deg, 1.5 m, certain, was +10 deg, 1.5 m',
         'merged "rack": as before',
-        'kept "hose": not named this time',
-        'kept "tap", +80 deg: not named this time',
+        'kept, not named this time: "hose", "tap"',
         'gone "chair"',
     ]
     assert answer["replaced"] == 'description "A room."; pose x 1.50, y 1.40, yaw 0 deg'

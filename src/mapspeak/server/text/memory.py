@@ -22,7 +22,7 @@ from mapspeak.places.recall.events import (
 from mapspeak.server.text.episodes import OBSERVED
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import say_count, say_pose, shorten
+from mapspeak.server.text.wording import list_some, say_count, say_pose, shorten
 from mapspeak.worldmodel.model import WorldModel
 
 
@@ -156,6 +156,7 @@ def say_also_closed(world: WorldModel, event: Event, now: datetime) -> str:
     return f"Closed there, too: {' and '.join(titles)}." if titles else ""
 
 
+MOST_KEPT = 6
 MOVED_M = 0.05
 FAR_M = 5.0
 """Looks at one place are taken from no farther apart."""
@@ -171,9 +172,8 @@ def say_landmarks(merge: Merge) -> Iterator[str]:
     for reunion in merge.merged:
         after = reunion.after
         yield f"merged {quote_name(after.label)}: {_say_change(reunion)}{_say_doubt(after)}"
-    for views in merge.kept:
-        said = ", ".join([quote_name(views[0].label), *_measures(views[0]), *_say_number(views)])
-        yield f"kept {said}: not named this time"
+    if kept := [quote_name(views[0].label) for views in merge.kept]:
+        yield f"kept, not named this time: {list_some(kept, most=MOST_KEPT)}"
     for landmark in merge.gone:
         yield f"gone {quote_name(landmark.label)}"
 
@@ -203,7 +203,8 @@ def say_far(previous: Waypoint, now: Waypoint, *, rooms: Sequence[str | None]) -
     """
     before, after = (room or "no room" for room in rooms)
     away_m = previous.pose.point.distance_to(now.pose.point)
-    if before == after and away_m <= FAR_M:
+    is_same_room = before == after and rooms[0] is not None
+    if is_same_room or (before == after and away_m <= FAR_M):
         return []
     said = f"was noted from {after} now, from {before} before, {away_m:.1f} m away."
     advice = "If that is another place, write it under a name of its own."

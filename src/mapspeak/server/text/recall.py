@@ -1,6 +1,6 @@
 """What is remembered of a request, in words: how far to trust it, and what to do next."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
@@ -9,6 +9,7 @@ from mapspeak.memory.quoting import name_key, quote, quote_name
 from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.memory.store.forgetting import Forgotten
 from mapspeak.memory.things.approach import LOOK_AGAIN_M
+from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.thing import Thing
 from mapspeak.places.asking import Recall
 from mapspeak.places.candidate import RecallCandidate, RecallDoubt
@@ -280,12 +281,14 @@ def say_gone(label: str, done: Forgotten | None, *, ids: Sequence[str], is_in_re
     return "" if is_in_record or done is not None else f"Nothing near by is remembered as {named}."
 
 
-def say_placed(world: WorldModel, name: str) -> list[str]:
-    """Say by id which things a place now speaks for, and where each is taken to be."""
+def say_placed(world: WorldModel, name: str, labels: Iterable[str]) -> list[str]:
+    """Say by id which things of some labels a place speaks for, and where each is taken to be."""
+    named = tuple(labels)
     return [
         f"{each.id} {quote_name(each.thing.label)}{_say_whereabouts(each.thing)}"
         for each in world.things
         if name in each.thing.waypoints
+        and any(name_the_same(each.thing.label, label) for label in named)
     ]
 
 

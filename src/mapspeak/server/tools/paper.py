@@ -12,7 +12,7 @@ from pydantic import Field, WithJsonSchema
 from mapspeak.driving.episodewriter import Keeping
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
+from mapspeak.memory import Landmark, Merge, TakenPicture, Waypoint, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.asking import find_speaking_places
 from mapspeak.places.goalcheck import FARTHEST_M
@@ -206,7 +206,8 @@ class PaperTools:
         told = filter(None, (*annotator.remarks, *far, unsure, kept.fault, moved))
         refused = annotator.refused
         answer = WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
-        return await self._with_things(answer, receipt.waypoint.name)
+        named = (*merge.new, *(each.after for each in merge.merged))
+        return await self._with_things(answer, receipt.waypoint.name, named)
 
     @tool("Recall remembered places", ToolEffect.READS, has_report=True)
     async def get_semantic_data(
@@ -315,15 +316,18 @@ class PaperTools:
         keep, name_map = self._session.episodes.keep_record, self._session.memory.name_map
         return await self._session.compute(partial(keep, waypoint, name_map=name_map))
 
-    async def _with_things(self, answer: WriteAnswer, name: str) -> WriteAnswer:
-        """Add where the things are that a place names, where a map is and that is soon told."""
+    async def _with_things(
+        self, answer: WriteAnswer, name: str, named: Sequence[Landmark]
+    ) -> WriteAnswer:
+        """Add where the things are that were named, where a map is and that is soon told."""
         try:
             world = await self._session.fetch_world_model()
         except (LinkError, MapError):
             return answer
         if len(world.places) > MOST_JOINED:
             return answer
-        things = await self._session.compute(partial(say_placed, world, name))
+        labels = [each.label for each in named]
+        things = await self._session.compute(partial(say_placed, world, name, labels))
         return answer.model_copy(update={"things": things})
 
     async def _find_room_id(self, pose: Pose) -> str | None:
