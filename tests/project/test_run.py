@@ -174,6 +174,30 @@ def test_two_calls_at_once_make_one_environment(desk: Desk) -> None:
     assert desk.calls_of_uv() == MADE
 
 
+SLOW_MKDIR = """#!/bin/sh
+{mkdir} "$@" || exit
+case $* in *.venv.lock) [ ! -p "$UV_LOG.gate" ] || cat "$UV_LOG.gate" ;; esac
+"""
+
+
+def test_a_call_whose_lock_another_one_took_waits_for_that_one(desk: Desk) -> None:
+    (desk.tools / "mkdir").unlink()
+    (desk.tools / "mkdir").write_text(SLOW_MKDIR.format(mkdir=shutil.which("mkdir")))
+    (desk.tools / "mkdir").chmod(0o755)
+    gate, others = Path(f"{desk.uv_log}.gate"), desk.checkout / ".venv.lock" / str(os.getpid())
+    os.mkfifo(gate)
+    call = desk.start("python", "mine")
+    with gate.open("w"):
+        others.mkdir()
+        gate.unlink()
+    assert call.stderr is not None
+    assert f"Waiting for ./run ({os.getpid()})" in call.stderr.readline()
+    assert desk.calls_of_uv() == []
+    others.rmdir()
+    assert call.communicate(timeout=30)[0] == "python mine\n"
+    assert desk.calls_of_uv() == MADE
+
+
 def test_a_lock_that_a_killed_call_left_behind_is_freed(desk: Desk) -> None:
     ended = subprocess.Popen(["true"])  # noqa: S607 - any process that has ended
     ended.wait()
