@@ -1,6 +1,5 @@
-"""Missions run: approved once, one at a time, with their record; their steps are tasks."""
+"""Missions run: approved once, one at a time, with their record; their leaves are tasks."""
 
-import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -8,7 +7,6 @@ from functools import partial
 from pathlib import Path
 
 import anyio
-from anyio.lowlevel import checkpoint
 
 from mapspeak.errors import MapspeakError, SkillError
 from mapspeak.safety import RunSkill, calling, current_caller, within_scope
@@ -26,10 +24,10 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.arguments import check_arguments
 from mapspeak.skills.bounds import FindSkill, MissionBounds, MissionCheck, needs_word, scope_of
-from mapspeak.skills.guarding import SkillGate, end_within
+from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missionrecord import MissionRecord
 from mapspeak.skills.skillsfile import OwnersEntry
-from mapspeak.skills.steps import Mission, Step, StepKind, fill_in
+from mapspeak.skills.steps import Mission, Step, fill_in
 
 MOST_TOLD = 40
 """Steps of the account that are told; the record on disk has all."""
@@ -65,9 +63,13 @@ class MissionRunner:
 
     async def run(self) -> SkillOutcome:
         """Run it to its end; cancelling this call cancels its running steps, too."""
+        # Loads py_trees: a server that runs no mission does without.
+        from mapspeak.skills.behaviours import StepTree  # noqa: PLC0415
+
+        tree = StepTree(self.mission.tree, self._do_leaf, self._facts, self.note)
         is_done = False
         with self._scope:
-            is_done = await self._do(self.mission.tree)
+            is_done = await tree.run()
         if self._cut_off is not None:
             return self._cut_off
         given = (step.output for step in self.mission.tree.walk())
@@ -77,78 +79,7 @@ class MissionRunner:
         last = self._last
         return SkillOutcome(SkillState.FAILED, last.code, outputs=outputs, quote=last.quote)
 
-    async def _do(self, step: Step) -> bool:
-        """Do a step, and return whether it has succeeded."""
-        match step.kind:
-            case StepKind.LEAF:
-                does = self._do_leaf
-            case StepKind.SEQUENCE | StepKind.REPEAT:
-                does = self._do_all
-            case StepKind.FALLBACK | StepKind.RETRY:
-                does = self._do_one
-            case StepKind.PARALLEL:
-                does = self._do_at_once
-            case StepKind.TIMEOUT:
-                does = self._do_in_time
-            case StepKind.EVERY:
-                does = self._do_every
-            case StepKind.UNTIL:
-                does = self._do_until
-        return await does(step)
-
-    async def _do_all(self, step: Step) -> bool:
-        for each in step.steps * step.times:
-            if not await self._do(each):
-                return False
-        return True
-
-    async def _do_one(self, step: Step) -> bool:
-        for each in step.steps * step.times:
-            if await self._do(each):
-                return True
-        return False
-
-    async def _do_at_once(self, step: Step) -> bool:
-        """Do steps at once; the first that fails cuts the others off, as one that is enough may."""
-        ended: list[bool] = []
-        async with anyio.create_task_group() as tasks:
-
-            async def do(each: Step) -> None:
-                ended.append(await self._do(each))
-                if not (ended[-1] and step.needs_all):
-                    tasks.cancel_scope.cancel()
-
-            for each in step.steps:
-                tasks.start_soon(do, each)
-        return all(ended)
-
-    async def _do_in_time(self, step: Step) -> bool:
-        return bool(await end_within(self._facts, step.limit, partial(self._do, step.steps[0])))
-
-    async def _do_every(self, step: Step) -> bool:
-        """Do all rounds, a period from one beginning to the next; fail where none succeeded."""
-        next_s, n_good = -math.inf, 0
-        for _ in range(step.times):
-            now_s = self._facts.now_s
-            begin_s = max(now_s, next_s)
-            next_s = begin_s + step.limit * 60
-            await self._facts.sleep(begin_s - now_s)
-            n_good += await self._do(step.steps[0])
-        done = f"{n_good} of {step.times} rounds did all their steps"
-        self.note(f"{step.number} {step.kind}: {done}")
-        return n_good > 0
-
-    async def _do_until(self, step: Step) -> bool:
-        wanted, condition = step.steps
-        for _ in range(step.times):
-            await self._do(wanted)
-            if await self._do(condition):
-                return True
-        return False
-
     async def _do_leaf(self, step: Step) -> bool:
-        # Here ends what was cut off between two steps.
-        await checkpoint()
         self.states[step.number] = SkillState.RUNNING
         try:
             skill = self.desk.find_part(step.skill, self.parts)
