@@ -163,8 +163,24 @@ async def test_what_no_picture_from_before_it_shows_is_looked_at_again_from_fart
         first = text_of(await client.call_tool("look_at", {"place": "exit sign"}))
         assert robot.pose == arrived
         await client.call_tool("look_at", {"place": "exit sign"})
-    assert "look_at again looks from as far as it was seen" in first
+    assert "look_at again looks from farther off" in first
     assert 1.5 <= SIGN.distance_to(robot.pose.point) <= 2.5
+
+
+async def test_what_the_latest_picture_from_before_it_shows_is_looked_at_from_there(
+    tmp_path: Path,
+) -> None:
+    def detect(label: str) -> tuple[Detection, ...]:
+        return (Detection(label=label, bearing_rad=0.0, range_m=1.0, confidence_ratio=0.9),)
+
+    async with seeing_a_sign(tmp_path, 2.2) as (robot, client):
+        await client.call_tool("navigate_to", {"place": "exit sign"})
+        arrived = robot.pose
+        for label in ("tap", "exit sign"):
+            robot.detections = detect(label)
+            await client.call_tool("look_through_camera", {})
+        await client.call_tool("look_at", {"place": "exit sign"})
+    assert robot.pose == arrived
 
 
 async def test_a_drive_that_takes_longer_is_waited_for_by_asking_again(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def _shows_as_well(world: WorldModel, place: Place, there: Pose, half_view_rad: 
 
 
 def is_missed_from_near(world: WorldModel, place: Place) -> bool:
-    """Return True where a picture from nearer than a thing was seen does not show it.
+    """Return True where the latest picture from nearer than a thing was seen does not show it.
 
     By the robot's detector, from where the robot stands: the thing may hang above the picture.
     """
@@ -120,13 +120,14 @@ def is_missed_from_near(world: WorldModel, place: Place) -> bool:
     if there is None:
         return False
     there_m, here_m = (place.point.distance_to(pose.point) for pose in (there, here))
-    label = remembered.thing.label
-    return here_m < there_m - NEARER_M and any(
-        is_there(each.pose, here)
-        and each.reported is not None
-        and not any(name_the_same(label, seen) for seen in each.reported)
-        for each in world.pictures
+    from_here = (
+        each.reported
+        for each in reversed(world.pictures)
+        if each.reported is not None and is_there(each.pose, here)
     )
+    shown, label = next(from_here, None), remembered.thing.label
+    is_missed = shown is not None and not any(name_the_same(label, each) for each in shown)
+    return is_missed and here_m < there_m - NEARER_M
 
 
 def is_there(robot: Pose, pose: Pose) -> bool:

@@ -127,8 +127,8 @@ CHECK = (
     "what is not there any more is given as gone."
 )
 FROM_FARTHER = (
-    "It is not reported from so near and may hang above the picture: {look_at} again looks from as "
-    "far as it was seen."
+    "It is not reported from so near and may hang above the picture: {look_at} again looks from "
+    "farther off."
 )
 
 
