@@ -1,5 +1,9 @@
 """The simulated robot behind the port."""
 
+import asyncio
+import threading
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -35,3 +39,30 @@ async def test_a_picture_is_of_where_the_robot_stood_when_it_was_begun() -> None
     assert picture.pose == before.pose
     assert picture.stamp_s == before.stamp_s
     assert after.pose.point.distance_to(before.pose.point) > 0.1
+
+
+def test_what_an_ended_event_loop_left_running_is_waited_for() -> None:
+    robot = SimulatedRobot(
+        Simulation(world_from_text(ROOM, start=(1.5, 1.5)), seed=1), has_detector=False
+    )
+    begun, may_end = threading.Event(), threading.Event()
+    ended: list[str] = []
+
+    def step() -> None:
+        begun.set()
+        may_end.wait()
+        ended.append("step")
+
+    async def be_interrupted() -> None:
+        stepping = asyncio.ensure_future(robot.compute(step))
+        await asyncio.to_thread(begun.wait)
+        stepping.cancel()
+        with suppress(asyncio.CancelledError):
+            await stepping
+        after = threading.Thread(target=robot.work_alone, args=(lambda: ended.append("map"),))
+        after.start()
+        may_end.set()
+        await asyncio.to_thread(after.join)
+
+    asyncio.run(be_interrupted())
+    assert ended == ["step", "map"]

@@ -2,6 +2,7 @@
 
 import io
 import math
+import threading
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from enum import StrEnum
@@ -79,6 +80,7 @@ class SimulatedRobot:
         self._has_detector = has_detector
         self._after_step = after_step or _do_nothing
         self._turn = anyio.Lock()
+        self._working = threading.Lock()
         self._looking = anyio.Lock()
         self._moved_on = News()
 
@@ -196,7 +198,15 @@ class SimulatedRobot:
     async def compute(self, work: Callable[[], T]) -> T:
         """Work on the simulation while no other call does."""
         async with self._turn:
-            return await anyio.to_thread.run_sync(work)
+            return await anyio.to_thread.run_sync(self.work_alone, work)
+
+    def work_alone(self, work: Callable[[], T]) -> T:
+        """Work on the simulation in this thread while no other does.
+
+        When an interrupted event loop ends, what `compute` began may go on in its thread.
+        """
+        with self._working:
+            return work()
 
     def _advance_to(self, until_s: float) -> None:
         while self._simulation.time_s < until_s - EPSILON_S:

@@ -365,19 +365,19 @@ async def _open_simulated(
         start=choice.start,
     )
 
-    def write_final_map(path: Path) -> None:
+    def write_final_map(robot: "SimulatedRobot", path: Path) -> None:
         with usual_modes():
-            write_map(simulation.map(), path, mode=MapMode.RAW)
+            write_map(robot.work_alone(simulation.map), path, mode=MapMode.RAW)
 
     log = None
     if choice.state_log is not None:
         log = files.enter_context(closing(StateLog(simulation, choice.state_log)))
-    if choice.final_map is not None:
-        files.callback(write_final_map, choice.final_map)
     async with open_simulated_robot(
         simulation,
         clock=Clock(choice.clock),
         has_detector=choice.has_detector,
         after_step=log.note if log else None,
     ) as robot:
+        if choice.final_map is not None:
+            files.callback(write_final_map, robot, choice.final_map)
         yield robot
