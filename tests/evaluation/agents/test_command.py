@@ -18,7 +18,7 @@ from mapspeak.evaluation.trials import Limits, TrialState
 
 pytestmark = pytest.mark.anyio
 
-PATIENCE_S = 60.0
+PATIENCE_S = 300.0
 KEY = "not-a-real-key-123456"
 CLIENT = Program(
     command=(sys.executable, clientprogram.__file__, "{config}", "{prompt}"),
@@ -31,7 +31,7 @@ CLIENT = Program(
 )
 
 
-def assignment(folder: Path, prompt: str, *, wall_s: float = 60.0) -> Assignment:
+def assignment(folder: Path, prompt: str, *, wall_s: float = 600.0) -> Assignment:
     """Gives a task in a world that is served over stdio."""
     server = (
         *(sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"),
