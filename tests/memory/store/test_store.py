@@ -300,6 +300,38 @@ def test_a_write_leaves_every_other_waypoint_as_it_stands(
     ]
 
 
+class Witness:
+    """A lock that remembers what a file held whenever it was taken, and whenever it was left."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.taken: list[bytes] = []
+        self.left: list[bytes] = []
+
+    def __enter__(self) -> None:
+        self.taken.append(self._content)
+
+    def __exit__(self, *_: object) -> None:
+        self.left.append(self._content)
+
+    @property
+    def _content(self) -> bytes:
+        return self._path.read_bytes() if self._path.exists() else b""
+
+
+def test_what_a_store_writes_no_other_thread_of_it_reads_again(path: Path) -> None:
+    looking = Witness(path)
+    store = SemanticMapStore(path, looking=looking)
+
+    for x in (1.0, 2.0):
+        store.write(place("dock", x))
+    store.read()
+
+    # It changes only while the others wait.
+    assert looking.taken[1:] == looking.left[:-1]
+    assert len(set(looking.left)) == 3
+
+
 def test_threads_that_read_at_once_read_the_file_once(path: Path) -> None:
     SemanticMapStore(path).write(place("dock"))
     store = SemanticMapStore(path, looking=threading.Lock())

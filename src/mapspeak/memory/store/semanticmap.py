@@ -47,7 +47,8 @@ class SemanticMapStore(MemoryStore):
     Args:
         path: The file; it and its folder need not exist yet.
         map_id: The map that the robot is on. None takes the file for what it says it is.
-        looking: Held while the file is looked at, so that of several threads one reads it.
+        looking: Held while the file is looked at or replaced, so that of several threads one reads
+            it, and none what was written here.
     """
 
     def __init__(
@@ -98,15 +99,22 @@ class SemanticMapStore(MemoryStore):
                 result = change(records)
                 if records.document is before:
                     return result
-                content = records.document.content
-                fingerprint = self._file.replace(content, expected=seen.fingerprint)
-                if fingerprint is not None:
-                    self._seen = _Seen(
-                        fingerprint=fingerprint, document=records.document, fault=None
-                    )
+                if self._replace(seen, records.document):
                     return result
         message = f"Another program changes {self.path} all the time; nothing was written."
         raise SemanticMapError(message, hint="End that program, then write again.")
+
+    def _replace(self, seen: _Seen, document: MapDocument) -> bool:
+        """Put a changed file in place of the one that was seen; False if it is another by now.
+
+        Others look when it is known that they need not read it.
+        """
+        content = document.content
+        with self._looking:
+            fingerprint = self._file.replace(content, expected=seen.fingerprint)
+            if fingerprint is not None:
+                self._seen = _Seen(fingerprint=fingerprint, document=document, fault=None)
+        return fingerprint is not None
 
     @staticmethod
     def _document(seen: _Seen) -> MapDocument:
