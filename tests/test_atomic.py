@@ -1,6 +1,7 @@
 """Files that are replaced as a whole, whatever happens meanwhile."""
 
 import errno
+import fcntl
 import os
 import subprocess
 import sys
@@ -58,8 +59,18 @@ def test_a_crash_leaves_the_old_file_and_hinders_no_later_write(path: Path, endi
     with replacing(path, ending=ending) as file:
         file.write(b"new")
     assert path.read_bytes() == b"new"
-    left = [each.name for each in path.parent.iterdir() if each != path]
-    assert len(left) == (not ending), "only who writes alone can tell what a crash has left"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_what_another_is_writing_stays_beside_what_one_has_left_that_was_killed(path: Path) -> None:
+    subprocess.run([sys.executable, "-c", CRASH, path, ""], check=False)  # noqa: S603 - our own program
+    [left] = (each for each in path.parent.iterdir() if each != path)
+    written = path.with_name(f".{path.name}.1")
+    with written.open("xb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        replace_file(path, b"new")
+        assert written.exists()
+    assert not left.exists()
 
 
 def test_a_new_file_that_is_closed_is_given_up(path: Path) -> None:

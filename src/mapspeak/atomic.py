@@ -6,6 +6,7 @@ Of a log it leaves at most half a line, the last one.
 import contextlib
 import errno
 import fcntl
+import glob
 import os
 import stat
 import sys
@@ -22,11 +23,10 @@ def replacing(path: Path, *, ending: str = "") -> Iterator[BinaryIO]:
 
     It keeps the permissions of the old file and, as far as we may, its owner; a symbolic link is
     followed, and a missing folder made. A block that raises, or closes the new file, leaves the
-    old one and nothing else.
+    old one and nothing else. What earlier writers have left that were killed goes.
 
     Args:
-        ending: Of the unfinished file's name, from a caller that keeps other writers away: what a
-            crash has left of an earlier one goes with it.
+        ending: Of the unfinished file's name, from a caller that keeps other writers away.
 
     Raises:
         OSError: It cannot be written.
@@ -35,8 +35,10 @@ def replacing(path: Path, *, ending: str = "") -> Iterator[BinaryIO]:
     target.parent.mkdir(parents=True, exist_ok=True)
     unfinished = target.with_name(f".{target.name}.{ending or os.getpid()}")
     unfinished.unlink(missing_ok=True)
+    if not ending:
+        _remove_left(target)
     try:
-        with unfinished.open("xb") as file:
+        with _open_locked(unfinished) as file:
             with contextlib.suppress(FileNotFoundError):
                 _take_after(target.stat(), unfinished)
             yield file
@@ -55,6 +57,25 @@ def replace_file(path: Path, content: bytes, *, ending: str = "") -> None:
     """Put a new content in a file's place; see `replacing`."""
     with replacing(path, ending=ending) as file:
         file.write(content)
+
+
+def _open_locked(unfinished: Path) -> BinaryIO:
+    """Return a new file that is locked while its writer lives and writes it."""
+    while True:
+        file = unfinished.open("xb")
+        fcntl.flock(file, fcntl.LOCK_EX)
+        if os.fstat(file.fileno()).st_nlink:
+            return file
+        # Another writer took it for one that was left before it was locked.
+        file.close()
+
+
+def _remove_left(target: Path) -> None:
+    """Remove unfinished files that no writer holds; of another machine no process id tells that."""
+    for left in target.parent.glob(f".{glob.escape(target.name)}.[0-9]*"):
+        with contextlib.suppress(OSError), left.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            left.unlink()
 
 
 def _take_after(status: os.stat_result, new: Path) -> None:

@@ -95,16 +95,23 @@ class Hold:
     def join(self, robot: str, *, address: str = "") -> None:
         """Tell that a robot is served from here, so that a stop knows whose answer it awaits.
 
+        What servers of this machine have left that were killed is removed.
+
         Args:
             address: Where it is; empty for one that only this process has.
         """
-        told = {"robot": robot, "process": os.getpid(), "address": address}
+        here = os.uname().nodename
+        told = {"robot": robot, "process": os.getpid(), "host": here, "address": address}
         with suppress(OSError):
             replace_file(self.folder / SERVED / _file_of(robot), json.dumps(told).encode())
+            for path, left in _read_all(self.folder / SERVED):
+                # In another container of the same folder a process of that id may run.
+                if left.get("host", here) == here and not is_running(left.get("process")):
+                    path.unlink(missing_ok=True)
 
     def servers_of(self, address: str) -> tuple[int, ...]:
         """Return the other processes that serve the robot at an address."""
-        # A simulated robot has none, and many servers may have been killed: each left a file.
+        # A simulated robot has none.
         served = _read_all(self.folder / SERVED) if address else ()
         found = {
             int(told["process"])

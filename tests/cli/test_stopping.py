@@ -124,6 +124,18 @@ def test_a_server_that_was_killed_is_waited_for_no_more(tmp_path: Path) -> None:
     assert hold.unanswered() == ()
 
 
+def test_what_a_killed_server_left_goes_when_the_next_one_starts(tmp_path: Path) -> None:
+    hold, served = make_guard(tmp_path).hold, tmp_path / "control" / "served"
+    hold.join("gone")
+    [left] = served.iterdir()
+    told = left.read_text().replace(str(os.getpid()), "999999999")
+    left.rename(served / "999999999-0.json").write_text(told)
+    elsewhere = served / "999999999-1.json"
+    elsewhere.write_text(told.replace(os.uname().nodename, "another container"))
+    hold.join("mine")
+    assert set(served.iterdir()) == {elsewhere, *served.glob(f"{os.getpid()}-*")}
+
+
 def test_a_stop_that_no_server_hears_says_so_and_holds_all_the_same(tmp_path: Path) -> None:
     control = str(tmp_path / "control")
     result = run("stop", "--control", control, "--wait-s", "0")
