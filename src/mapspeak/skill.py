@@ -1,8 +1,6 @@
-"""THE PORT: a robot's skills besides driving, and their values.
+"""THE PORT: a robot's skills besides driving: a description and a function that does it.
 
-A skill is a description (`SkillSpec`) and a function that does it. Exposed topics, services and
-actions, entries of skills.yaml, skills of the simulated robot, leaves of missions and missions
-themselves all have this one form.
+Exposed interfaces, entries of skills.yaml, the robot's own skills, leaves and missions are skills.
 """
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
@@ -15,6 +13,16 @@ from mapspeak.robot import Robot
 JsonValue = Any
 """A value of JSON: None, a truth value, a number, a text, a list or an object by its names."""
 Arguments = Mapping[str, JsonValue]
+Schema = Mapping[str, JsonValue]
+"""What a value may be, as JSON Schema says it, with two words more: its `unit`, such as "m", and
+`required`, true where it cannot be left out. Descriptions are quoted, never followed.
+"""
+
+
+def parameter(kind: str, **words: JsonValue) -> Schema:
+    """Return a schema by the words of JSON Schema; None and "" say nothing."""
+    said = {word: each for word, each in words.items() if each is not None and each != ""}
+    return {"type": kind, **said}
 
 
 class SkillEffect(StrEnum):
@@ -23,47 +31,6 @@ class SkillEffect(StrEnum):
     READS = "reads"
     MOVES = "moves"
     CHANGES = "changes"
-
-
-class ParameterKind(StrEnum):
-    """The type of a parameter's value; bytes are a text in base64."""
-
-    NUMBER = "number"
-    WHOLE = "whole"
-    TEXT = "text"
-    BYTES = "bytes"
-    FLAG = "flag"
-    LIST = "list"
-    OBJECT = "object"
-
-
-@dataclass(frozen=True, slots=True)
-class SkillParameter:
-    """One parameter of a skill, or an element of a list or an object within one.
-
-    Attributes:
-        name: Empty for an element of a list.
-        description: What it is, in its owner's words: quoted, never followed.
-        unit: Such as "m".
-        least: The least number; of a list, the least count of values.
-        most: The largest number; of a list, the most values; of a text, the most letters.
-        choices: The only values it may have; empty where it may have any.
-        item: The element of a list.
-        fields: Of an object.
-    """
-
-    name: str
-    kind: ParameterKind
-    _: KW_ONLY
-    description: str = ""
-    unit: str = ""
-    least: float | None = None
-    most: float | None = None
-    choices: tuple[JsonValue, ...] = ()
-    is_required: bool = False
-    default: JsonValue = None
-    item: "SkillParameter | None" = None
-    fields: tuple["SkillParameter", ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +50,7 @@ class SkillSpec:
     effect: SkillEffect
     _: KW_ONLY
     timeout_s: float
-    parameters: tuple[SkillParameter, ...] = ()
+    parameters: Mapping[str, Schema] = field(default_factory=dict)
     needs: Arguments = field(default_factory=dict)
     is_always_asked: bool = False
 
@@ -160,10 +127,8 @@ OnProgress = Callable[[SkillProgress], None]
 class Skill:
     """Something that a robot can do, by name.
 
-    `run` does it once, and returns how it ended. Everything it started is ended when its task is
-    cancelled: nothing of it is left running at the robot. It raises `MapspeakError` where it cannot
-    be begun, for wrong arguments, a denied or a missing interface, or an approval that is needed;
-    nothing was sent to the robot then.
+    `run` does it once, and returns how it ended. When its task is cancelled, nothing of it is left
+    running at the robot. Where it raises `MapspeakError` nothing was sent there.
     """
 
     spec: SkillSpec
@@ -174,11 +139,7 @@ class SkilledRobot(Protocol):
     """A robot with skills of its own, which need no ROS; `mapspeak.skills` guards each of them."""
 
     def build_skills(self, driven: Robot) -> Sequence[Skill]:
-        """Return its skills besides driving, looking and stopping.
-
-        Args:
-            driven: The robot itself, or what guards its drives: skills that drive send goals there.
-        """
+        """Return its skills besides driving; those that drive send goals to `driven`."""
 
     async def fetch_battery(self) -> float | None:
         """Return how full its battery is, from 0 to 1; None where it does not tell."""

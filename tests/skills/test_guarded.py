@@ -18,14 +18,7 @@ from mapspeak.safety import (
     Patterns,
     Policy,
 )
-from mapspeak.skill import (
-    Arguments,
-    ParameterKind,
-    SkillCode,
-    SkillOutcome,
-    SkillParameter,
-    SkillState,
-)
+from mapspeak.skill import Arguments, SkillCode, SkillOutcome, SkillState, parameter
 from mapspeak.skills.guarding import SkillGate
 from skillmaking import FakeFacts, FakeSkill, never, spec, tell_nobody
 
@@ -143,8 +136,8 @@ async def test_a_skill_that_never_ends_is_ended_by_the_robots_clock() -> None:
 
 
 async def test_arguments_that_do_not_fit_are_refused_before_anything_else(tmp_path: Path) -> None:
-    width = SkillParameter("width", ParameterKind.NUMBER, most=0.1, is_required=True)
-    skill = FakeSkill(spec(parameters=(width,)))
+    width = parameter("number", maximum=0.1, required=True)
+    skill = FakeSkill(spec(parameters={"width": width}))
     guarded = SkillGate(FakeFacts(), make_guard(tmp_path)).hold(skill)
     for wrong in (2, 10**400, float("nan"), "wide"):
         with pytest.raises(SkillError, match="width"):

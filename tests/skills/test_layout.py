@@ -14,7 +14,6 @@ from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.interfaces import Interfaces
-from mapspeak.skill import ParameterKind
 from mapspeak.skills.arguments import check_arguments, schema_of
 from mapspeak.skills.layout import build_layout
 from messaging import messages_of
@@ -58,18 +57,19 @@ def test_a_message_of_any_type_is_the_same_after_it_was_arguments(
 
 def test_messages_within_are_laid_flat_with_units_remarks_and_constants() -> None:
     layout = build_layout(TypeBook(GRIPPER), "arm_msgs/Grip")
-    mode, x, *_, force, picture = layout.parameters
-    assert [each.name for each in layout.parameters] == [
+    mode, x, *_, force, picture = layout.parameters.values()
+    assert list(layout.parameters) == [
         *("reach_mode", "reach_at_x", "reach_at_y", "reach_at_z", "force", "picture")
     ]
-    assert (mode.description, mode.least, mode.most) == ("OPEN=0, CLOSE=1", 0, 255)
-    assert (x.unit, force.description) == ("m", "newtons, at the finger tips")
-    assert picture.kind is ParameterKind.BYTES
+    assert mode["description"] == "OPEN=0, CLOSE=1"
+    assert (mode["minimum"], mode["maximum"]) == (0, 255)
+    assert (x["unit"], force["description"]) == ("m", "newtons, at the finger tips")
+    assert picture["contentEncoding"] == "base64"
 
 
 def test_two_fields_that_would_have_one_name_are_told_apart() -> None:
     texts = {"a_msgs/A": "B a\nint8 a_b", "a_msgs/B": "int8 b"}
-    names = [each.name for each in build_layout(TypeBook(texts), "a_msgs/A").parameters]
+    names = list(build_layout(TypeBook(texts), "a_msgs/A").parameters)
     assert names == ["a__b", "a_b"]
 
 

@@ -3,25 +3,30 @@
 import pytest
 
 from mapspeak.errors import SkillError
-from mapspeak.skills.runs import QuestionBook
+from mapspeak.skills.runs import Question, QuestionBook
+
+
+def put(questions: QuestionBook, text: str, *, client: str) -> Question:
+    questions.put(question := Question(text=text, client=client, within_s=9.0))
+    return question
 
 
 def test_only_the_client_that_runs_a_mission_answers_its_questions_while_it_is_there() -> None:
     questions = QuestionBook()
-    asked = questions.put("Open?", (), picture=None, client="one", within_s=9.0, otherwise=None)
+    asked = put(questions, "Open?", client="one")
     with pytest.raises(SkillError, match="of yours"):
         questions.find(None, client="other")
     with pytest.raises(SkillError, match="of yours"):
         questions.find(asked.id, client="other")
     assert questions.find(None, client="one") is asked
-    questions.client_is_gone("one")
+    questions.gone.add("one")
     assert questions.find(None, client="other") is asked
 
 
 def test_each_client_is_shown_its_own_oldest_question() -> None:
     questions = QuestionBook()
-    first = questions.put("One?", (), picture=None, client="one", within_s=9.0, otherwise=None)
-    second = questions.put("Other?", (), picture=None, client="other", within_s=9.0, otherwise=None)
+    first = put(questions, "One?", client="one")
+    second = put(questions, "Other?", client="other")
     assert questions.find(None, client="other") is second
     assert questions.find(None, client="one") is first
     with pytest.raises(SkillError, match="'Q7'"):

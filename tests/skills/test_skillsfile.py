@@ -6,12 +6,7 @@ from pathlib import Path
 import pytest
 
 from mapspeak.errors import ConfigError
-from mapspeak.skill import (
-    ParameterKind,
-    SkillEffect,
-    SkillOutcome,
-    SkillState,
-)
+from mapspeak.skill import SkillEffect, SkillOutcome, SkillState
 from mapspeak.skills.skillsfile import (
     READY_MADE,
     Called,
@@ -54,25 +49,28 @@ def test_an_entry_says_all_that_is_known_of_a_skill(tmp_path: Path) -> None:
         "/gripper/set",
         {"command": "open"},
     )
-    width, side, quietly = known.parameters
-    assert (width.kind, width.least, width.most, width.default) == (
-        ParameterKind.NUMBER,
+    width, side, quietly = (known.parameters[each] for each in ("width", "side", "quietly"))
+    assert (width["type"], width["minimum"], width["maximum"], width["default"]) == (
+        "number",
         0,
         0.085,
         0.08,
     )
-    assert (side.kind, side.choices, side.is_required) == (
-        ParameterKind.TEXT,
-        ("left", "right"),
-        True,
-    )
-    assert quietly.kind is ParameterKind.FLAG
+    assert (side["type"], side["enum"], side["required"]) == ("string", ["left", "right"], True)
+    assert quietly["type"] == "boolean"
     assert known.needs == {"battery_above": 0.2, "standing": True, "in_room": "R3"}
     assert (known.timeout_s, known.effect, known.is_always_asked) == (
         10.0,
         SkillEffect.CHANGES,
         True,
     )
+
+
+def test_numbers_that_are_written_as_texts_are_numbers_in_conditions(tmp_path: Path) -> None:
+    written = FULL.replace("0.2,", "'0.2',").replace("is: false", "above: '3'")
+    (entry,) = load(tmp_path, written)
+    assert entry.spec.needs["battery_above"] == 0.2
+    assert entry.succeeded_when["above"] == 3.0
 
 
 @pytest.mark.parametrize(
@@ -85,7 +83,7 @@ def test_an_entry_says_all_that_is_known_of_a_skill(tmp_path: Path) -> None:
         ("default: 0.08,", "default: 0.8,", "default cannot be 0.8"),
         ("least: 0,", "least: 1,", "has least above most"),
         ("name: open_gripper", "name: Open it", "not of the form"),
-        ("is: false", "was: false", "'skills.0.succeeded_when.was' is not a key"),
+        ("is: false", "was: false", "it takes no 'was'"),
         ("{field: stalled, is: false}", "{field: stalled}", "needs one of: is, above, below"),
         ("battery_above: 0.2", "battery_above: 20", "battery_above cannot be 20"),
         ("effect: changes", "effect: explodes", "'explodes'"),
@@ -106,7 +104,7 @@ def test_a_mistake_is_named_with_its_line_and_reason(
 def test_a_mistake_in_the_tree_of_a_mission_is_named_with_its_line_in_the_file(
     tmp_path: Path,
 ) -> None:
-    with pytest.raises(ConfigError, match="skill rounds: Line 5: retry cannot be 'often'"):
+    with pytest.raises(ConfigError, match="skill rounds: Line 5: retry: retry cannot be 'often'"):
         load(
             tmp_path,
             "skills:\n- name: rounds\n  mission:\n  - drive: R1\n  - retry: often\n    do: look\n",

@@ -7,18 +7,10 @@ from pathlib import Path
 import pytest
 
 from mapspeak.errors import SkillError
-from mapspeak.server.text.skills import draw_mission, say_mission
-from mapspeak.skill import (
-    JsonValue,
-    ParameterKind,
-    Skill,
-    SkillEffect,
-    SkillParameter,
-)
-from mapspeak.skills.bounds import MissionBounds
+from mapspeak.server.text.skills.words import draw_mission, say_mission
+from mapspeak.skill import JsonValue, Schema, Skill, SkillEffect, parameter
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.missionrunner import MissionDesk
+from mapspeak.skills.missions import MissionBounds, MissionDesk, MissionRecord
 from mapspeak.skills.steps import Mission, Step, StepKind, fill_in, parse_tree, read_tree
 from skillmaking import FakeFacts, FakeSkill, spec
 
@@ -27,25 +19,25 @@ def read(text: str) -> Step:
     return read_tree(parse_tree(text))
 
 
-def text(name: str, *, is_required: bool = True) -> SkillParameter:
-    return SkillParameter(name, ParameterKind.TEXT, is_required=is_required)
+def text(*names: str, is_required: bool = True) -> dict[str, Schema]:
+    return dict.fromkeys(names, parameter("string", required=is_required))
 
 
-LEVEL = SkillParameter("level", ParameterKind.NUMBER, least=0, most=3, default=1)
+LEVEL = parameter("number", minimum=0, maximum=3, default=1)
 SKILLS: dict[str, Skill] = {
-    "drive": FakeSkill(spec("drive", parameters=(text("place"),))),
+    "drive": FakeSkill(spec("drive", parameters=text("place"))),
     "speak": FakeSkill(
-        spec("speak", effect=SkillEffect.CHANGES, parameters=(text("words"), LEVEL))
+        spec("speak", effect=SkillEffect.CHANGES, parameters={**text("words"), "level": LEVEL})
     ),
     "dock": FakeSkill(spec("dock", is_always_asked=True)),
     "check": FakeSkill(
-        spec("check", effect=SkillEffect.READS, parameters=(text("sees", is_required=False),))
+        spec("check", effect=SkillEffect.READS, parameters=text("sees", is_required=False))
     ),
 }
 
 
 def mission(tree: str, *parameters: str, name: str = "mission") -> Mission:
-    given = spec(name, parameters=tuple(map(text, parameters)), timeout_s=600.0)
+    given = spec(name, parameters=text(*parameters), timeout_s=600.0)
     return Mission(given, FakeSkill(given).run, read(tree))
 
 
@@ -104,11 +96,11 @@ def test_json_is_read_as_well() -> None:
         ("x" * 40_000, "40,000 characters"),
         ("- drive: [", "no YAML"),
         ("- drive: R1\n- 5\n", "5 is no step"),
-        ("- sequence: []", "Line 1: sequence needs a list"),
-        ("- drive: R1\n- retry: many\n  do: dock\n", "Line 2: retry cannot be 'many'"),
-        ("- repeat: 100000\n  do: dock\n", "up to 1000"),
-        ("- timeout_s: 5\n", "needs `do`"),
-        ("- fallback: [dock]\n  do: dock\n", "'do' does not belong to fallback"),
+        ("- sequence: []", "Line 1: sequence: sequence cannot be []. Give a list of at least 1."),
+        ("- drive: R1\n- retry: many\n  do: dock\n", "Line 2: retry: retry cannot be 'many'"),
+        ("- repeat: 100000\n  do: dock\n", "to 1000"),
+        ("- timeout_s: 5\n", "timeout_s needs do"),
+        ("- fallback: [dock]\n  do: dock\n", "fallback takes no 'do'"),
         ("- {}", "an empty step is no step"),
         ("- drop table: x", "is no name of a skill"),
     ],

@@ -60,9 +60,9 @@ def list_skills(file: Path) -> None:
     for each in _load(file):
         spec = each.spec
         click.echo(f"{spec.name}: {spec.description or each.target or each.calls}")
-        for parameter in spec.parameters:
-            default = "" if parameter.default is None else f", {parameter.default!r} if left out"
-            click.echo(f"  {parameter.name}: {say_wanted(parameter)}{default}")
+        for name, schema in spec.parameters.items():
+            default = f", {schema['default']!r} if left out" if "default" in schema else ""
+            click.echo(f"  {name}: {say_wanted(schema)}{default}")
 
 
 @skills.command("try")
@@ -142,8 +142,8 @@ async def _try(
     robot: str,
     guard: GuardChoice,
 ) -> None:
-    from mapspeak.server.tools.skills.calling import say_run  # noqa: PLC0415
-    from mapspeak.server.tools.skills.missions import read_values  # noqa: PLC0415
+    from mapspeak.server.text.skills.words import say_run  # noqa: PLC0415
+    from mapspeak.server.tools.skills.tools import read_values  # noqa: PLC0415
     from mapspeak.skill import SkillState  # noqa: PLC0415
 
     async with _open(entries, robot, guard) as book:

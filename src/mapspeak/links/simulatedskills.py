@@ -13,15 +13,15 @@ from mapspeak.simulator import Equipment
 from mapspeak.skill import (
     Arguments,
     OnProgress,
-    ParameterKind,
+    Schema,
     Skill,
     SkillCode,
     SkillEffect,
     SkillOutcome,
-    SkillParameter,
     SkillProgress,
     SkillSpec,
     failed,
+    parameter,
     succeeded,
 )
 
@@ -137,26 +137,23 @@ async def _read_battery(hands: Hands, _given: Arguments, _told: OnProgress) -> S
     return succeeded(battery_percent=round(100 * hands.equipment.charge_ratio, 1))
 
 
-_UNTIL = SkillParameter(
-    "until_percent",
-    ParameterKind.NUMBER,
+_UNTIL = parameter(
+    "number",
     description="stay until the battery is so full",
     unit="%",
-    least=0.0,
-    most=100.0,
+    minimum=0.0,
+    maximum=100.0,
     default=0.0,
 )
-_TEXT = SkillParameter(
-    "text", ParameterKind.TEXT, description="what to say", most=MOST_LETTERS, is_required=True
-)
+_TEXT = parameter("string", description="what to say", maxLength=MOST_LETTERS, required=True)
 
 
 def _spec(
     name: str,
     description: str,
     effect: SkillEffect = SkillEffect.CHANGES,
-    *parameters: SkillParameter,
     timeout_s: float = 60.0,
+    **parameters: Schema,
 ) -> SkillSpec:
     return SkillSpec(name, description, effect, timeout_s=timeout_s, parameters=parameters)
 
@@ -167,10 +164,10 @@ _LIFT = "Have the forklift lift the pallet within 1.8 m."
 _LOWER = "Have the forklift put down the lifted pallet within 1.8 m."
 _SPEAK = "Say something aloud where the robot stands."
 _SKILLS: tuple[tuple[SkillSpec, Doing], ...] = (
-    (_spec("dock", _DOCK, _MOVES, _UNTIL, timeout_s=1200.0), _dock),
+    (_spec("dock", _DOCK, _MOVES, 1200.0, until_percent=_UNTIL), _dock),
     (_spec("open_door", "Open the nearest shut door within 1.8 m."), _open_door),
     (_spec("lift_pallet", _LIFT), partial(_move_pallet, is_lifted=True)),
     (_spec("lower_pallet", _LOWER), partial(_move_pallet, is_lifted=False)),
-    (_spec("speak", _SPEAK, _CHANGES, _TEXT), _speak),
+    (_spec("speak", _SPEAK, _CHANGES, text=_TEXT), _speak),
     (_spec("read_battery", "Tell how full the battery is.", _READS), _read_battery),
 )

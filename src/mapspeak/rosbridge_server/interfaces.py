@@ -21,7 +21,7 @@ from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook, name
 from mapspeak.ros.messages.fields import Dialect, Message, bare_type, write_header
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub
 from mapspeak.rosbridge_server.navigation import BASE_FRAME, Nav2
-from mapspeak.skill import ParameterKind, Skill, SkillProgress, SkillState
+from mapspeak.skill import Skill, SkillProgress, SkillState
 
 ROS2_DISTRIBUTION = "jazzy"
 
@@ -198,12 +198,7 @@ def refusal(error: MapspeakError) -> str:
 PACKAGE, NODE = "robot_skills", "/robot_skills"
 BATTERY_TOPIC, BATTERY_TYPE = "/battery_state", "sensor_msgs/BatteryState"
 TRIGGER, RESPONSE = "std_srvs/Trigger", "bool success\nstring message"
-WRITTEN = {
-    ParameterKind.NUMBER: "float64",
-    ParameterKind.WHOLE: "int64",
-    ParameterKind.TEXT: "string",
-    ParameterKind.FLAG: "bool",
-}
+WRITTEN = {"number": "float64", "integer": "int64", "string": "string", "boolean": "bool"}
 CHARGING, DISCHARGING, GOOD, LITHIUM_ION = 1, 2, 1, 2
 
 
@@ -213,7 +208,8 @@ def types_of(skills: Sequence[Skill]) -> dict[str, str]:
     for skill in skills:
         if not skill.spec.parameters:
             continue
-        fields = (f"{WRITTEN[each.kind]} {each.name}" for each in skill.spec.parameters)
+        takes = skill.spec.parameters.items()
+        fields = (f"{WRITTEN[schema['type']]} {name}" for name, schema in takes)
         texts[f"{_type_of(skill)}_Request"] = "\n".join(fields)
         texts[f"{_type_of(skill)}_Response"] = RESPONSE
     return texts

@@ -31,8 +31,7 @@ from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
 from mapspeak.server.tools.routes import RouteTools
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.calling import SkillRunTools
-from mapspeak.server.tools.skills.missions import MissionTools
+from mapspeak.server.tools.skills.tools import MissionTools, SkillRunTools
 from mapspeak.server.tools.toolset import Tool, ToolEffect, tools_of
 from mapspeak.session import Session
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, time
 from functools import partial
 from typing import Protocol, TypeVar
 
@@ -16,38 +16,37 @@ from mapspeak.skill import (
     Arguments,
     JsonValue,
     OnProgress,
-    ParameterKind,
     Skill,
     SkillCode,
     SkillEffect,
     SkillOutcome,
-    SkillParameter,
     SkillSpec,
     SkillState,
+    parameter,
 )
 from mapspeak.skills.arguments import check_arguments, plain
 
-TEXT, NUMBER, FLAG = ParameterKind.TEXT, ParameterKind.NUMBER, ParameterKind.FLAG
-OF_FACTS = (
-    SkillParameter("battery_above", NUMBER, unit="0 to 1", least=0, most=1),
-    SkillParameter("battery_below", NUMBER, unit="0 to 1", least=0, most=1),
-    SkillParameter("standing", FLAG, description="no drive is under way"),
-    SkillParameter("in_room", TEXT, description="an id or a name", most=200),
-    SkillParameter("near", TEXT, description="a place", most=200),
-    SkillParameter("within_m", NUMBER, description="of near", default=1.0),
-    SkillParameter("event", TEXT, description="words of an event that lasts now", most=200),
-    SkillParameter("sees", TEXT, description="a thing that the detector reports now", most=200),
-    SkillParameter("time_from", TEXT, description="such as 22:00", most=5),
-    SkillParameter("time_until", TEXT, description="such as 06:00", most=5),
-    SkillParameter("not", FLAG, description="the opposite", default=False),
-)
-CONDITIONS = (
-    *OF_FACTS,
-    SkillParameter("value", TEXT, description="a result, such as {door.answer}", most=1000),
-    SkillParameter("is", TEXT, description="the wanted value", most=1000),
-    SkillParameter("above", NUMBER, description="of the value"),
-    SkillParameter("below", NUMBER, description="of the value"),
-)
+_SHARE = parameter("number", unit="0 to 1", minimum=0, maximum=1)
+OF_FACTS = {
+    "battery_above": _SHARE,
+    "battery_below": _SHARE,
+    "standing": parameter("boolean", description="no drive is under way"),
+    "in_room": parameter("string", description="an id or a name", maxLength=200),
+    "near": parameter("string", description="a place", maxLength=200),
+    "within_m": parameter("number", description="of near", default=1.0),
+    "event": parameter("string", description="words of an event that lasts now", maxLength=200),
+    "sees": parameter("string", description="a thing that the detector reports now", maxLength=200),
+    "time_from": parameter("string", description="such as 22:00", maxLength=5),
+    "time_until": parameter("string", description="such as 06:00", maxLength=5),
+    "not": parameter("boolean", description="the opposite", default=False),
+}
+CONDITIONS = {
+    **OF_FACTS,
+    "value": parameter("string", description="a result, such as {door.answer}", maxLength=1000),
+    "is": parameter("string", description="the wanted value", maxLength=1000),
+    "above": parameter("number", description="of the value"),
+    "below": parameter("number", description="of the value"),
+}
 COMPARING = frozenset({"value", "is", "above", "below"})
 TIMES = frozenset({"time_from", "time_until"})
 MODIFIERS = frozenset({"not", "within_m", "within_s"})
@@ -78,35 +77,30 @@ class Facts(Protocol):
 async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
     """Return the first condition that does not hold, by its name; empty where all hold.
 
-    What is not known does not hold, and neither does its opposite.
-
-    Raises:
-        SkillError: Nothing is wanted, or a time of day cannot be read.
+    What is not known does not hold, and neither does its opposite. SkillError where nothing is
+    wanted, or a time of day cannot be read.
     """
-    named = [name for name in wanted if name not in MODIFIERS]
+    named = {name: each for name, each in wanted.items() if name not in MODIFIERS}
     if not named:
         raise SkillError(
             "A condition needs something that is to hold.",
-            hint=f"Give one of: {', '.join(each.name for each in CONDITIONS)}.",
+            hint=f"Give one of: {', '.join(CONDITIONS)}.",
         )
     is_opposite = wanted.get("not", False)
-    for name in named:
-        holds = await _holds(name, wanted, facts)
+    for name, value in named.items():
+        if name in TIMES:
+            holds = _is_time(wanted, facts.read_calendar())
+        elif name not in COMPARING:
+            holds = await facts.holds(name, wanted)
+        elif "value" in wanted:
+            holds = is_as_wanted(wanted["value"], wanted)
+        else:
+            raise SkillError("is, above and below need a value.", hint="Write value: '{name}'.")
         if is_opposite and holds is False:
             return {}
         if not is_opposite and not holds:
-            return {name: wanted[name]}
-    return {"not": {name: wanted[name] for name in named}} if is_opposite else {}
-
-
-async def _holds(name: str, wanted: Arguments, facts: Facts) -> bool | None:
-    if name in TIMES:
-        return _is_time(wanted, facts.read_calendar())
-    if name not in COMPARING:
-        return await facts.holds(name, wanted)
-    if "value" not in wanted:
-        raise SkillError("is, above and below need a value.", hint="Write value: '{name}'.")
-    return is_as_wanted(wanted["value"], wanted)
+            return {name: value}
+    return {"not": named} if is_opposite else {}
 
 
 def is_as_wanted(value: JsonValue, wanted: Mapping[str, JsonValue]) -> bool:
@@ -126,40 +120,30 @@ def is_as_wanted(value: JsonValue, wanted: Mapping[str, JsonValue]) -> bool:
 def _is_time(wanted: Arguments, now: datetime | None) -> bool | None:
     if now is None:
         return None
-    begins = _minutes(wanted.get("time_from", "00:00"))
-    ends = _minutes(wanted.get("time_until", "24:00"))
-    minute = now.hour * 60 + now.minute
-    return begins <= minute < ends if begins < ends else minute >= begins or minute < ends
+    begins, ends = (_read_time(wanted.get(key, "00:00")) for key in ("time_from", "time_until"))
+    at = now.time()
+    return begins <= at < ends if begins < ends else at >= begins or at < ends
 
 
-def _minutes(said: str) -> int:
-    if said == "24:00":
-        return 24 * 60
+def _read_time(said: str) -> time:
     try:
-        at = datetime.strptime(said, "%H:%M")  # noqa: DTZ007 - a time of day has no zone
+        return time.fromisoformat(said.replace("24:00", "00:00").zfill(5))
     except ValueError as error:
         raise SkillError(f"{said!r} is no time of day.", hint="Write it as 22:00.") from error
-    return at.hour * 60 + at.minute
 
 
 @dataclass(frozen=True, slots=True)
 class SkillGate:
-    """Holds skills to their arguments, their conditions, the policy and their time.
-
-    Attributes:
-        guard: Decides and logs; None in tests.
-    """
+    """Holds skills to their arguments, their conditions, the policy and their time."""
 
     facts: Facts
     guard: Guard | None
 
     def hold(self, skill: Skill, *, is_through_guard: bool = False) -> Skill:
-        """Return a skill that is run through this gate alone.
+        """Return a skill that is run through this gate alone; no other object may run it.
 
-        Args:
-            skill: The skill; no other object may run it.
-            is_through_guard: Each command of the skill to the robot passes the guard by itself, so
-                that the skill needs a permit of its own only where a person must approve it.
+        Where each of its commands to the robot `is_through_guard` by itself, it needs a permit of
+        its own only if a person must approve it.
         """
         spec = skill.spec
         is_free = spec.effect is SkillEffect.READS or is_through_guard
@@ -168,11 +152,8 @@ class SkillGate:
             given = check_arguments(spec.parameters, arguments, skill=spec.name)
             needs_word = spec.is_always_asked
             command = RunSkill(skill=spec.name, arguments=given, needs_word=needs_word)
-            return await self.run_once(
-                spec,
-                partial(skill.run, given, on_progress),
-                command=None if is_free and not needs_word else command,
-            )
+            asked = None if is_free and not needs_word else command
+            return await self.run_once(spec, partial(skill.run, given, on_progress), command=asked)
 
         return Skill(spec, run)
 
@@ -189,22 +170,17 @@ class SkillGate:
         Args:
             command: The guard decides on it; None for a skill that only reads, or asks by itself.
             is_covering: A person's word for the command covers what the work commands.
-
-        Raises:
-            MapspeakError: It is not allowed, or the work could not begin.
         """
-        facts, guard = self.facts, self.guard
+        facts, guard, limit_s = self.facts, self.guard, spec.timeout_s
         if spec.needs and (unmet := await find_unmet(spec.needs, facts)):
             return SkillOutcome(SkillState.FAILED, SkillCode.PRECONDITION, unmet=unmet)
-        late = SkillOutcome(
-            SkillState.TIMED_OUT, SkillCode.TOO_LATE, numbers={"after_s": spec.timeout_s}
-        )
+        late = SkillOutcome(SkillState.TIMED_OUT, SkillCode.TOO_LATE, numbers={"after_s": limit_s})
         if guard is None or command is None:
-            return await end_within(facts, spec.timeout_s, work) or late
+            return await end_within(facts, limit_s, work) or late
         permit, said = guard.clear(command, robot_s=facts.now_s), "given up"
         try:
             with covered_by(permit.by) if is_covering else nullcontext():
-                outcome = await end_within(facts, spec.timeout_s, work) or late
+                outcome = await end_within(facts, limit_s, work) or late
             said = outcome.state
             return outcome
         finally:
@@ -212,11 +188,7 @@ class SkillGate:
 
 
 async def end_within(facts: Facts, limit_s: float, work: Callable[[], Awaitable[T]]) -> T | None:
-    """Return the result of some work; None where it was cancelled at the time limit.
-
-    Raises:
-        MapspeakError: As the work does.
-    """
+    """Return the result of some work; None where it was cancelled at the time limit."""
     result: T | None = None
     failure: MapspeakError | None = None
     async with anyio.create_task_group() as tasks:

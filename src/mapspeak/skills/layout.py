@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
@@ -12,14 +12,14 @@ from mapspeak.errors import LinkError
 from mapspeak.memory.quoting import clean_line
 from mapspeak.ros.definitions.types import FLOATS, TEXTS, TIMES, WHOLES, Field, TypeBook, look_up
 from mapspeak.ros.messages.fields import Message, bare_type
-from mapspeak.skill import JsonValue, ParameterKind, SkillParameter
+from mapspeak.skill import JsonValue, Schema, parameter
 
 MOST_FLAT = 40
 """A type with more plain fields keeps its messages as objects."""
 MOST_LISTED = 1000
 """A list of no stated length takes no more from a model."""
 MOST_DESCRIBED = 3000
-"""Parameters, with those within others; no type that people use comes near."""
+"""Fields, with those within others; no type that people use comes near."""
 MOST_IN_LIST = 32
 """Of bytes; longer ones are given as one text in base64."""
 MOST_TEXT = 100_000
@@ -44,89 +44,73 @@ UNITS = {
 
 @dataclass(frozen=True)
 class MessageLayout:
-    """A message type as the parameters of a skill, by where in the message their values belong."""
+    """A message type as the parameters of a skill.
 
-    slots: Mapping[tuple[str, ...], SkillParameter]
+    Attributes:
+        parameters: By name, in the order of the fields.
+        paths: Where in the message the value of each belongs.
+    """
 
-    @property
-    def parameters(self) -> tuple[SkillParameter, ...]:
-        """The parameters, in the order of the fields."""
-        return tuple(self.slots.values())
+    parameters: Mapping[str, Schema]
+    paths: Mapping[str, tuple[str, ...]]
 
     def build(self, arguments: Mapping[str, JsonValue]) -> dict[str, Any]:
         """Return the message with some arguments; missing ones stay out."""
         message: dict[str, Any] = {}
-        for (*above, last), parameter in self.slots.items():
-            if parameter.name in arguments:
+        for name, (*above, last) in self.paths.items():
+            if name in arguments:
                 inner = message
                 for part in above:
                     inner = inner.setdefault(part, {})
-                inner[last] = arguments[parameter.name]
+                inner[last] = arguments[name]
         return message
 
     def read(self, message: Message) -> dict[str, JsonValue]:
         """Return a message as arguments that would build it; large lists by their length."""
         found: dict[str, JsonValue] = {}
-        for path, parameter in self.slots.items():
+        for name, path in self.paths.items():
             value: Any = message
             for part in path:
                 value = value.get(part) if isinstance(value, Mapping) else None
             if value is not None:
-                found[parameter.name] = _read_value(parameter, value)
+                found[name] = _read_value(self.parameters[name], value)
         return found
 
 
-def _read_value(parameter: SkillParameter, value: Any) -> JsonValue:  # noqa: ANN401 - ROS JSON
+def _read_value(schema: Schema, value: Any) -> JsonValue:  # noqa: ANN401 - ROS JSON
     """Return a value of a message as its argument would be given."""
-    match parameter.kind:
-        case ParameterKind.OBJECT if isinstance(value, Mapping):
-            inner = {each.name: each for each in parameter.fields}
-            return {name: _read_value(inner[name], each) for name, each in value.items()}
-        case ParameterKind.BYTES | ParameterKind.LIST:
-            return _read_list(
-                parameter, base64.b64decode(value) if isinstance(value, str) else value
-            )
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _read_list(parameter: SkillParameter, value: Any) -> JsonValue:  # noqa: ANN401 - ROS JSON
+    if schema["type"] == "object" and isinstance(value, Mapping):
+        return {name: _read_value(schema["properties"][name], each) for name, each in value.items()}
+    is_base64 = "contentEncoding" in schema
+    if schema["type"] != "array" and not is_base64:
+        return value.item() if isinstance(value, np.generic) else value
     value = base64.b64decode(value) if isinstance(value, str) else value
-    if parameter.kind is ParameterKind.BYTES:
+    if is_base64:
         data = bytes(value)
         return base64.b64encode(data).decode() if len(data) <= MOST_TEXT else f"({len(data)} bytes)"
-    item, listed = parameter.item, value.tolist() if isinstance(value, np.ndarray) else list(value)
+    listed = value.tolist() if isinstance(value, np.ndarray) else list(value)
     if len(listed) > MOST_LISTED:
         return f"({len(listed)} values)"
-    return listed if item is None else [_read_value(item, each) for each in listed]
+    return [_read_value(schema["items"], each) for each in listed]
 
 
 def build_layout(
     book: TypeBook, type_name: str, *, reserved: frozenset[str] = frozenset()
 ) -> MessageLayout:
-    """Return a message type as parameters.
+    """Return a message type as parameters; one that would have a reserved name is called "its_…".
 
-    Args:
-        book: Holds the type and all types within.
-        type_name: As "package/Type".
-        reserved: Names that are no parameter's; one that would have such a name is called "its_…".
-
-    Raises:
-        LinkError: A type within is not described, or holds itself, or there are too many.
+    LinkError where a type within is not described, or holds itself, or there are too many.
     """
     builder, way = _Builder(book), (bare_type(type_name),)
     leaves = dict(islice(builder.leaves(way, path=(), unit=""), MOST_FLAT + 1))
     if len(leaves) > MOST_FLAT:
         fields = book[type_name].fields
-        leaves = {(each.name,): builder.parameter(way, each, "") for each in fields}
+        leaves = {(each.name,): builder.describe(way, each, "") for each in fields}
     # Where two paths joined by one low line are the same, two stand between their parts.
     glue = "_" if len({"_".join(path) for path in leaves}) == len(leaves) else "__"
-    names = {path: glue.join(path) for path in leaves}
-    return MessageLayout(
-        {
-            path: replace(leaf, name=f"its_{name}" if (name := names[path]) in reserved else name)
-            for path, leaf in leaves.items()
-        }
-    )
+    joined = {glue.join(path): path for path in leaves}
+    paths = {f"its_{name}" if name in reserved else name: path for name, path in joined.items()}
+    return MessageLayout({name: leaves[path] for name, path in paths.items()}, paths)
 
 
 class _Builder:
@@ -138,7 +122,7 @@ class _Builder:
 
     def leaves(
         self, way: tuple[str, ...], *, path: tuple[str, ...], unit: str
-    ) -> Iterator[tuple[tuple[str, ...], SkillParameter]]:
+    ) -> Iterator[tuple[tuple[str, ...], Schema]]:
         """Yield the fields of a message that are no messages themselves, all the way down."""
         for field in self._book[way[-1]].fields:
             where = (*path, field.name)
@@ -146,10 +130,10 @@ class _Builder:
                 inner, its_unit = self._enter(way, field), _unit(way, field, unit)
                 yield from self.leaves(inner, path=where, unit=its_unit)
             else:
-                yield where, self.parameter(way, field, unit)
+                yield where, self.describe(way, field, unit)
 
-    def parameter(self, way: tuple[str, ...], field: Field, unit: str) -> SkillParameter:
-        """Return a field as one parameter, whatever it holds."""
+    def describe(self, way: tuple[str, ...], field: Field, unit: str) -> Schema:
+        """Return what a field may be, whatever it holds."""
         self._n_described += 1
         if self._n_described > MOST_DESCRIBED:
             raise LinkError(
@@ -158,34 +142,29 @@ class _Builder:
             )
         unit, remark = _unit(way, field, unit), self._remark(way, field)
         if field.length is None:
-            return replace(self._one(way, field, unit), name=field.name, description=remark)
+            return {**self._one(way, field, unit), **({"description": remark} if remark else {})}
         longest = field.length or field.most or MOST_LISTED
         if field.type == "uint8" and longest > MOST_IN_LIST:
-            return SkillParameter(
-                field.name, ParameterKind.BYTES, description=remark, most=MOST_TEXT
-            )
-        return SkillParameter(
-            field.name,
-            ParameterKind.LIST,
-            description=remark,
-            unit=unit,
-            least=field.length or None,
-            most=longest,
-            item=self._one(way, field, ""),
-        )
+            encoded = {"contentEncoding": "base64", "maxLength": MOST_TEXT}
+            return parameter("string", **encoded, description=remark)
+        limits = {"minItems": field.length or None, "maxItems": longest}
+        items = self._one(way, field, "")
+        return parameter("array", items=items, **limits, unit=unit, description=remark)
 
-    def _one(self, way: tuple[str, ...], field: Field, unit: str) -> SkillParameter:
-        """Return a field, or one of its list, as a parameter without a name."""
+    def _one(self, way: tuple[str, ...], field: Field, unit: str) -> Schema:
+        """Return what a field, or one of its list, may be."""
         if _is_message(field):
             inner = self._enter(way, field)
-            fields = (self.parameter(inner, each, unit) for each in self._book[inner[-1]].fields)
-            return SkillParameter("", ParameterKind.OBJECT, fields=tuple(fields))
+            fields = self._book[inner[-1]].fields
+            within = {each.name: self.describe(inner, each, unit) for each in fields}
+            return parameter("object", properties=within)
         default = self._book.default(field) if field.default and field.length is None else None
-        least, most = WHOLES.get(field.type, (None, None))
         if field.type in TEXTS:
-            most = field.most_letters or MOST_TEXT
-        kind = _kind_of(field)
-        return SkillParameter("", kind, unit=unit, least=least, most=most, default=default)
+            return parameter("string", maxLength=field.most_letters or MOST_TEXT, default=default)
+        is_number = field.type in FLOATS
+        kind = "number" if is_number else "integer" if field.type in WHOLES else "boolean"
+        least, most = WHOLES.get(field.type, (None, None))
+        return parameter(kind, unit=unit, minimum=least, maximum=most, default=default)
 
     def _enter(self, way: tuple[str, ...], field: Field) -> tuple[str, ...]:
         """Return the way into a field that is a message."""
@@ -207,11 +186,3 @@ def _is_message(field: Field) -> bool:
 
 def _unit(way: tuple[str, ...], field: Field, inherited: str) -> str:
     return UNITS.get(way[-1], {}).get(field.name, inherited)
-
-
-def _kind_of(field: Field) -> ParameterKind:
-    if field.type in FLOATS:
-        return ParameterKind.NUMBER
-    if field.type in WHOLES:
-        return ParameterKind.WHOLE
-    return ParameterKind.FLAG if field.type == "bool" else ParameterKind.TEXT

@@ -1,20 +1,23 @@
-"""Missions run: approved once, one at a time, with their record; their leaves are tasks."""
+"""One mission run once, as a tree of py_trees that is ticked whenever work beside it has ended."""
 
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import anyio
+import py_trees
+from anyio.abc import TaskGroup
+from py_trees.behaviour import Behaviour
+from py_trees.common import ParallelPolicy, Status
+from py_trees.composites import Parallel, Selector, Sequence
+from py_trees.decorators import Decorator, FailureIsSuccess, Repeat, Retry
 
-from mapspeak.errors import MapspeakError, SkillError
-from mapspeak.safety import RunSkill, calling, current_caller, within_scope
+from mapspeak.errors import MapspeakError
 from mapspeak.skill import (
     Arguments,
-    JsonValue,
     OnProgress,
-    Skill,
     SkillCode,
     SkillOutcome,
     SkillProgress,
@@ -22,16 +25,17 @@ from mapspeak.skill import (
     failed,
     succeeded,
 )
-from mapspeak.skills.arguments import check_arguments
-from mapspeak.skills.bounds import FindSkill, MissionBounds, MissionCheck, needs_word, scope_of
-from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.skillsfile import OwnersEntry
-from mapspeak.skills.steps import Mission, Step, fill_in
+from mapspeak.skills.guarding import wait
+from mapspeak.skills.steps import Mission, Step, StepKind, fill_in
+
+if TYPE_CHECKING:
+    from mapspeak.skills.missions import MissionDesk, Parts
 
 MOST_TOLD = 40
 """Steps of the account that are told; the record on disk has all."""
 MOST_LINE = 300
+ALL, ONE = ParallelPolicy.SuccessOnAll, ParallelPolicy.SuccessOnOne
+Work = Callable[[], Awaitable[bool]]
 
 
 @dataclass(eq=False)
@@ -40,43 +44,47 @@ class MissionRunner:
 
     Attributes:
         desk: Finds the skill of a leaf when that begins: it may have gone meanwhile.
-        mission: With a tree that was checked before.
-        parts: The missions within it, as they were when it was approved.
+        mission: With a tree that was checked before, as were the missions within it, its parts.
         states: Of the leaves that have begun, by their numbers.
+        ending: What was cut off and has not ended yet; nothing new begins before.
     """
 
     desk: "MissionDesk"
     mission: Mission
     given: Arguments
-    parts: Mapping[str, Mission]
+    parts: "Parts"
     on_progress: OnProgress
     states: dict[int, SkillState] = field(default_factory=dict)
     is_over: bool = False
+    tasks: TaskGroup | None = None
+    ending: set[anyio.CancelScope] = field(default_factory=set)
+    news: anyio.Event = field(default_factory=anyio.Event)
     _account: list[str] = field(default_factory=list)
-    _scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
-    _cut_off: SkillOutcome | None = None
     _last: SkillOutcome = field(default_factory=failed)
+    _is_cut_off: bool = False
 
     def __post_init__(self) -> None:
-        self._facts = self.desk.gate.facts
-        self._values: dict[str, JsonValue] = dict(self.given)
+        # py_trees prints its messages, and stdout belongs to the protocol.
+        py_trees.logging.level = py_trees.logging.Level.ERROR
+        self._facts, self._values = self.desk.gate.facts, dict(self.given)
+        self._root = self._build(self.mission.tree)
 
     async def run(self) -> SkillOutcome:
         """Run it to its end; cancelling this call cancels its running steps, too."""
-        # Loads py_trees: a server that runs no mission does without.
-        from mapspeak.skills.behaviours import StepTree  # noqa: PLC0415
-
-        tree = StepTree(self.mission.tree, self._do_leaf, self._facts, self.note)
-        is_done = False
-        with self._scope:
-            is_done = await tree.run()
-        if self._cut_off is not None:
-            return self._cut_off
-        given = (step.output for step in self.mission.tree.walk())
-        outputs = {name: self._values[name] for name in given if name in self._values}
-        if is_done:
+        async with anyio.create_task_group() as self.tasks:
+            while not self._is_cut_off:
+                self.news = anyio.Event()
+                self._root.tick_once()
+                if self._root.status is not Status.RUNNING:
+                    break
+                await self.news.wait()
+            self.tasks.cancel_scope.cancel()
+        last, names = self._last, (step.output for step in self.mission.tree.walk())
+        outputs = {name: self._values[name] for name in names if name in self._values}
+        if self._is_cut_off:
+            return last
+        if self._root.status is Status.SUCCESS:
             return succeeded(**outputs)
-        last = self._last
         return SkillOutcome(SkillState.FAILED, last.code, outputs=outputs, quote=last.quote)
 
     async def _do_leaf(self, step: Step) -> bool:
@@ -88,150 +96,146 @@ class MissionRunner:
             outcome = await skill.run(given, partial(self._take_progress, step))
         except anyio.get_cancelled_exc_class():
             self.states[step.number] = SkillState.CANCELLED
-            self.note(f"{step.number} {step.skill}: cut off")
+            self._note(f"{step.number} {step.skill}: cut off")
             raise
         except MapspeakError as error:
             outcome = failed(SkillCode.REJECTED, error.message)
         self.states[step.number] = outcome.state
         if step.output:
             self._values[step.output] = {**outcome.outputs, "ended": str(outcome.state)}
-        self.note(_say_end(step, outcome))
+        self._note(_say_end(step, outcome))
         if outcome.state is SkillState.SUCCEEDED:
             return True
-        self._last = outcome
-        if outcome.state is SkillState.CANCELLED:
-            # A person, another client or the robot's own software has taken over.
-            self._cut_off = outcome
-            self._scope.cancel()
+        if not self._is_cut_off:
+            # A person, another client or the robot's own software may have taken over.
+            self._last, self._is_cut_off = outcome, outcome.state is SkillState.CANCELLED
         return False
 
-    def note(self, said: str) -> None:
+    def _note(self, said: str) -> None:
         """Tell and keep what was done, with the time by the operator's clock, else the robot's."""
         at = self._facts.read_calendar()
         time = f"{self._facts.now_s:.0f} s" if at is None else f"{at:%H:%M:%S}"
         self._account.append(f"{time} {said}")
         self.desk.record.note(said)
-        self._tell(now="")
+        self._tell()
 
     def _take_progress(self, step: Step, progress: SkillProgress) -> None:
-        inner = progress.account
-        now = f"{step.number} {step.skill}" + (f" [{inner[-1]}]" if inner else "")
-        self._tell(now=now, values=progress.values)
+        inner = f" [{progress.account[-1]}]" if progress.account else ""
+        self._tell(now=f"{step.number} {step.skill}{inner}", values=progress.values)
 
-    def _tell(self, *, now: str, values: Mapping[str, JsonValue] | None = None) -> None:
-        told = tuple(self._account[-MOST_TOLD:]) + ((f"now: {now}",) if now else ())
+    def _tell(self, *, now: str = "", values: Arguments | None = None) -> None:
+        told = (*self._account[-MOST_TOLD:], *([f"now: {now}"] if now else []))
         self.on_progress(SkillProgress(values=values or {}, account=told))
+
+    def _build(self, step: Step) -> Behaviour:
+        name = f"{step.number} {step.skill or step.kind}"
+        parts = [self._build(each) for each in step.steps]
+        node: Behaviour
+        match step.kind:
+            case StepKind.LEAF:
+                node = _Work(name, partial(self._do_leaf, step), self)
+            case StepKind.SEQUENCE:
+                node = Sequence(name, memory=True, children=parts)
+            case StepKind.FALLBACK:
+                node = Selector(name, memory=True, children=parts)
+            case StepKind.PARALLEL:
+                node = Parallel(name, ALL() if step.needs_all else ONE(), children=parts)
+            case StepKind.RETRY:
+                node = Retry(name, parts[0], step.times)
+            case StepKind.REPEAT:
+                node = Repeat(name, parts[0], step.times)
+            case StepKind.TIMEOUT:
+                expiring = _Work(name, partial(self._expire, step.limit), self)
+                node = Parallel(name, ONE(), children=[parts[0], expiring])
+            case StepKind.EVERY:
+                pacing = _Work(name, self._pace(step.limit * 60), self)
+                once = Sequence(name, memory=True, children=[pacing, *parts])
+                node = _Rounds(name, once, step.times, self._note)
+            case StepKind.UNTIL:
+                in_any_case = FailureIsSuccess(name, parts[0])
+                once = Sequence(name, memory=True, children=[in_any_case, parts[1]])
+                node = Retry(name, once, step.times)
+        return node
+
+    async def _expire(self, limit_s: float) -> bool:
+        await wait(self._facts, limit_s)
+        return False
+
+    def _pace(self, period_s: float) -> Work:
+        """Return work that lets a period pass between two beginnings; the first comes at once."""
+        next_s = -math.inf
+
+        async def keep() -> bool:
+            nonlocal next_s
+            now_s = self._facts.now_s
+            begin_s = max(now_s, next_s)
+            next_s = begin_s + period_s
+            await self._facts.sleep(begin_s - now_s)
+            return True
+
+        return keep
 
 
 def _say_end(step: Step, outcome: SkillOutcome) -> str:
-    said = f"{step.number} {step.skill}: {outcome.state}"
-    if outcome.code is not SkillCode.DONE:
-        said += f" ({outcome.code})"
+    code = "" if outcome.code is SkillCode.DONE else f" ({outcome.code})"
     told = (f"{name}={str(each)[:60]}" for name, each in outcome.outputs.items() if each != "")
-    said = f"{said} {', '.join(told)}".rstrip()
-    if outcome.quote:
-        said += f' "{outcome.quote[:120]}"'
-    return said[:MOST_LINE]
+    said = f"{step.number} {step.skill}: {outcome.state}{code} {', '.join(told)}".rstrip()
+    return (said + (f' "{outcome.quote[:120]}"' if outcome.quote else ""))[:MOST_LINE]
 
 
-@dataclass(eq=False)
-class MissionDesk:
-    """Checks and runs the missions of one server.
+class _Rounds(Decorator):
+    """Several rounds, which all take place; they fail where none has succeeded."""
 
-    Attributes:
-        find_skill: Raises `SkillError` for a name that it does not know.
-        present: Marks a client as present: a mission needs no client while it runs.
-        begins: Called as a mission begins.
-    """
+    def __init__(self, name: str, child: Behaviour, n: int, note: Callable[[str], None]) -> None:
+        super().__init__(name, child)
+        self._n_rounds, self._note = n, note
+        self._n_done = self._n_good = 0
 
-    find_skill: FindSkill
-    gate: SkillGate
-    record: MissionRecord
-    present: Callable[[], AbstractContextManager[None]] = nullcontext
-    begins: Callable[[], None] = lambda: None
-    latest: MissionRunner | None = None
+    def initialise(self) -> None:
+        self._n_done = self._n_good = 0
 
-    def check(self, mission: Mission) -> MissionBounds:
-        """Return what a mission can do at most.
+    def update(self) -> Status:
+        if (status := self.decorated.status) is Status.RUNNING:
+            return status
+        self._n_done += 1
+        self._n_good += status is Status.SUCCESS
+        if self._n_done < self._n_rounds:
+            return Status.RUNNING
+        self._note(f"{self.name}: {self._n_good} of {self._n_rounds} rounds did all their steps")
+        return Status.SUCCESS if self._n_good else Status.FAILURE
 
-        Raises:
-            SkillError: A part of it is unknown, not allowed, or does not fit.
-        """
-        return MissionCheck(self.find_skill).find_bounds(mission)
 
-    def open(self, entry: OwnersEntry, path: Path | None = None) -> Mission:
-        """Return the mission that is written in an entry, or saved in a file.
+class _Work(Behaviour):
+    """Ends as some work beside the tree does; it begins anew whenever it is ticked anew."""
 
-        Raises:
-            SkillError: Its tree has a mistake.
-        """
+    def __init__(self, name: str, work: Work, runner: MissionRunner) -> None:
+        super().__init__(name)
+        self._work, self._runner = work, runner
+        self._scope, self._ended = anyio.CancelScope(), Status.INVALID
 
-        async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
-            return await self._run(mission, arguments, on_progress)
+    def initialise(self) -> None:
+        self._scope, self._ended = anyio.CancelScope(), Status.RUNNING
+        if self._runner.tasks is not None:
+            self._runner.tasks.start_soon(self._do, self._scope)
 
-        mission = Mission(entry.spec, run, entry.tree, tuple(entry.remember), path)
-        return mission
+    async def _do(self, scope: anyio.CancelScope) -> None:
+        with scope:
+            while self._runner.ending:
+                await self._runner.news.wait()
+            is_done = await self._work()
+            if not scope.cancel_called:
+                self._ended = Status.SUCCESS if is_done else Status.FAILURE
+        self._runner.ending.discard(scope)
+        self._runner.news.set()
 
-    async def _run(
-        self, mission: Mission, arguments: Arguments, on_progress: OnProgress
-    ) -> SkillOutcome:
-        """Run a mission, for which a person is asked once, unless another one is under way."""
-        spec = mission.spec
-        given = check_arguments(spec.parameters, arguments, skill=spec.name)
-        if self.latest is not None and not self.latest.is_over:
-            raise SkillError(
-                "Another mission is under way; there is one at a time.",
-                hint="Wait for its end, or cancel it.",
-            )
-        bounds = self.check(mission)
-        scope, guard = scope_of(mission, given, bounds), self.gate.guard
-        kinds = frozenset() if guard is None else guard.policy.approval.kinds
-        self.latest = runner = MissionRunner(self, mission, given, bounds.parts, on_progress)
-        self.begins()
-        try:
-            acting = replace(current_caller(), mission=spec.name)
-            with self.present(), within_scope(scope), calling(acting):
-                return await self.gate.run_once(
-                    spec,
-                    partial(self._run_recorded, runner),
-                    command=RunSkill(
-                        skill=spec.name,
-                        arguments=given,
-                        needs_word=needs_word(spec, bounds, kinds),
-                    ),
-                    is_covering=False,
-                )
-        finally:
-            runner.is_over = True
-            if guard is not None:
-                guard.end_scope(scope)
+    def update(self) -> Status:
+        return self._ended
 
-    async def _run_recorded(self, runner: MissionRunner) -> SkillOutcome:
-        said = "cut off"
-        self.record.begin(runner.mission.spec.name)
-        try:
-            outcome = await runner.run()
-            said = str(outcome.state)
-        finally:
-            self.record.note(said, event="ended")
-        return outcome
-
-    def find_part(self, name: str, parts: Mapping[str, Mission]) -> Skill:
-        """Return the skill of a leaf; a mission is approved and recorded with the one around it.
-
-        Args:
-            parts: The missions within, as they were when that one was approved.
-
-        Raises:
-            SkillError: There is none of that name now.
-        """
-        if (part := parts.get(name)) is None:
-            return self.find_skill(name)
-        spec = part.spec
-
-        async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
-            given = check_arguments(spec.parameters, arguments, skill=name)
-            runner = MissionRunner(self, part, given, parts, on_progress)
-            return await self.gate.run_once(spec, runner.run, command=None)
-
-        return Skill(spec, run)
+    def terminate(self, new_status: Status) -> None:
+        if new_status is not Status.INVALID:
+            # A repeated step begins anew at the next tick.
+            self._runner.news.set()
+        elif self._ended is Status.RUNNING:
+            self._ended = Status.INVALID
+            self._runner.ending.add(self._scope)
+            self._scope.cancel()

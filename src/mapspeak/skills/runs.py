@@ -1,7 +1,6 @@
 """Runs of skills in the background, and the questions that they ask meanwhile."""
 
 import logging
-from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -33,99 +32,68 @@ LOOK_S = 0.05
 logger = logging.getLogger(__name__)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Question:
     """A question that waits.
 
     Attributes:
-        id: Such as "Q1".
         client: The session that may answer it, as long as it is there; empty for anyone.
-        picture: Its subject, and `picture_id`, such as "P3"; None where the mission has taken none.
+        picture_id: Of its subject, such as "P3"; that of the latest picture where left out.
         within_s: Robot time that it waits from when it is asked.
         otherwise: The answer where none comes; None where its step fails then.
-        answer: None until one is given.
     """
 
-    id: str
     text: str
-    answers: tuple[str, ...]
+    answers: tuple[str, ...] = ()
     client: str
-    picture_id: str
-    picture: CameraPicture | None
+    picture_id: str | None = None
     within_s: float
-    otherwise: str | None
+    otherwise: str | None = None
+    id: str = ""
+    picture: CameraPicture | None = None
     answer: str | None = None
     is_answered: anyio.Event = field(default_factory=anyio.Event)
 
 
+@dataclass(eq=False)
 class QuestionBook:
-    """The questions of missions, the oldest first."""
+    """The questions of missions, the oldest first.
 
-    def __init__(self) -> None:
-        self._asked: list[Question] = []
-        self._n_asked = 0
-        self._gone: set[str] = set()
-        self._pictures: OrderedDict[str, CameraPicture] = OrderedDict()
+    Attributes:
+        pictures: What they are about, by their ids.
+        gone: The clients whose questions anyone may answer: their missions go on without them.
+    """
+
+    pictures: dict[str, CameraPicture] = field(default_factory=dict)
+    asked: list[Question] = field(default_factory=list)
+    gone: set[str] = field(default_factory=set)
+    _n_asked: int = 0
 
     def keep(self, picture_id: str, picture: CameraPicture) -> None:
         """Keep a picture that a mission has taken."""
-        self._pictures[picture_id] = picture
-        while len(self._pictures) > MOST_PICTURES:
-            self._pictures.popitem(last=False)
+        self.pictures[picture_id] = picture
+        for oldest in list(self.pictures)[:-MOST_PICTURES]:
+            del self.pictures[oldest]
 
-    def forget_pictures(self) -> None:
-        """Forget the pictures of the mission before."""
-        self._pictures.clear()
-
-    def put(
-        self,
-        text: str,
-        answers: tuple[str, ...],
-        *,
-        picture: str | None,
-        client: str,
-        within_s: float,
-        otherwise: str | None,
-    ) -> Question:
-        """Let a question wait, about a picture or the latest."""
+    def put(self, question: Question) -> None:
+        """Let a question wait."""
         self._n_asked += 1
-        about = next(reversed(self._pictures), "") if picture is None else picture
-        question = Question(
-            id=f"Q{self._n_asked}",
-            text=text,
-            answers=answers,
-            client=client,
-            picture_id=about,
-            picture=self._pictures.get(about),
-            within_s=within_s,
-            otherwise=otherwise,
-        )
-        self._asked.append(question)
-        return question
-
-    def take_back(self, question: Question) -> None:
-        """Have a question wait no longer."""
-        self._asked.remove(question)
+        if question.picture_id is None:
+            question.picture_id = next(reversed(self.pictures), "")
+        question.id, question.picture = f"Q{self._n_asked}", self.pictures.get(question.picture_id)
+        self.asked.append(question)
 
     @property
     def waiting(self) -> list[Question]:
         """Those that no answer was given to."""
-        return [each for each in self._asked if each.answer is None]
-
-    def client_is_gone(self, client: str) -> None:
-        """Let anyone answer what a client would have been asked: its missions go on without it."""
-        self._gone.add(client)
+        return [each for each in self.asked if each.answer is None]
 
     def find(self, question_id: str | None, *, client: str | None) -> Question:
-        """Return a question that waits for a client; the oldest unless one is named.
+        """Return a question that waits for the session of a client; the oldest unless one is named.
 
-        Args:
-            client: Its session; None for a person, who may answer every question.
-
-        Raises:
-            SkillError: None waits for it, or not that one.
+        A person, whose client is None, may answer every one. SkillError where none waits.
         """
-        waiting, open_to = self.waiting, {"", client, *self._gone}
+        waiting, open_to = self.waiting, {"", client, *self.gone}
         mine = {each.id: each for each in waiting if client is None or each.client in open_to}
         if not mine and waiting:
             hint = "Only the client that runs the mission answers it."
@@ -139,11 +107,7 @@ class QuestionBook:
         return mine[wanted]
 
     def answer(self, question: Question, answer: str) -> str:
-        """Give an answer, and return it as the mission takes it.
-
-        Raises:
-            SkillError: It is not one of the accepted answers.
-        """
+        """Give an answer, and return it as it is taken; SkillError where it is not."""
         taken = {each.casefold(): each for each in question.answers}
         said = answer.strip()
         if taken and said.casefold() not in taken:
@@ -164,9 +128,7 @@ class SkillRun:
     """One run of a skill, as far as it has come; kept after its end.
 
     Attributes:
-        handle: Its name for the model, such as "S1".
         client: It ends when that client is gone; None for a mission, which goes on.
-        n_stops_before: The count of stops when it began.
         outcome: None while it goes on, and where it could not be begun.
         error: Why it could not be begun.
     """
@@ -174,9 +136,7 @@ class SkillRun:
     handle: str
     skill: Skill
     client: str | None
-    n_stops_before: int
-    questions: QuestionBook
-    read_clock_s: Callable[[], float]
+    runs: "SkillRuns"
     progress: SkillProgress = field(default_factory=SkillProgress)
     n_progress: int = 0
     outcome: SkillOutcome | None = None
@@ -187,7 +147,7 @@ class SkillRun:
     _why: SkillCode = SkillCode.CANCELLED
 
     def __post_init__(self) -> None:
-        self._begun_s = self.read_clock_s()
+        self._begun_s, self._n_stops = self.runs.read_clock_s(), self.runs.count_stops()
 
     @property
     def is_over(self) -> bool:
@@ -204,12 +164,19 @@ class SkillRun:
     @property
     def is_asking(self) -> bool:
         """True while it waits for an answer; missions alone ask, one at a time."""
-        return not self.is_over and isinstance(self.skill, Mission) and bool(self.questions.waiting)
+        asks = isinstance(self.skill, Mission) and bool(self.runs.questions.waiting)
+        return asks and not self.is_over
+
+    @property
+    def is_stopped(self) -> bool:
+        """True where a stop of the robot since it began is to end it."""
+        does = self.skill.spec.effect is not SkillEffect.READS
+        return does and self._n_stops != self.runs.count_stops()
 
     @property
     def passed_s(self) -> float:
         """How long it has taken, or took, in robot time."""
-        now_s = self.read_clock_s() if self._ended_s is None else self._ended_s
+        now_s = self.runs.read_clock_s() if self._ended_s is None else self._ended_s
         return max(now_s - self._begun_s, 0.0)
 
     async def do(self, arguments: Arguments) -> None:
@@ -226,7 +193,7 @@ class SkillRun:
             logger.exception("The skill %s failed by a mistake in it", self.skill.spec.name)
             self.outcome = SkillOutcome(SkillState.FAILED, SkillCode.LOST)
         finally:
-            self._ended_s = self.read_clock_s()
+            self._ended_s = self.runs.read_clock_s()
             self._tell()
 
     async def wait(self, *, wait_s: float, on_news: OnNews | None = None) -> None:
@@ -264,15 +231,13 @@ class SkillRuns:
     """All runs of one server, the latest last; they go on while `keep_going` runs.
 
     Attributes:
-        count_stops: Changes at each stop of the robot, which ends all runs but those that only
-            read.
-        read_clock_s: Robot time.
+        count_stops: Changes at each stop of the robot, which ends all runs that do more than read.
     """
 
     count_stops: Callable[[], int] = lambda: 0
     read_clock_s: Callable[[], float] = anyio.current_time
     questions: QuestionBook = field(default_factory=QuestionBook)
-    _runs: OrderedDict[str, SkillRun] = field(default_factory=OrderedDict)
+    _runs: dict[str, SkillRun] = field(default_factory=dict)
     _n_begun: int = 0
     _tasks: TaskGroup | None = None
 
@@ -296,8 +261,7 @@ class SkillRuns:
         while True:
             await anyio.sleep(LOOK_S)
             for run in self.under_way:
-                does = run.skill.spec.effect is not SkillEffect.READS
-                if does and run.n_stops_before != self.count_stops():
+                if run.is_stopped:
                     run.give_up(SkillCode.STOPPED)
 
     async def begin(
@@ -305,10 +269,7 @@ class SkillRuns:
     ) -> SkillRun:
         """Run a skill, and return when it has ended, or when the time is over while it goes on.
 
-        Cancelling this call gives up the run.
-
-        Raises:
-            MapspeakError: It could not begin.
+        Cancelling this call gives up the run. MapspeakError where it could not begin.
         """
         if self._tasks is None:
             raise LinkError("No skill can be run: the server is ending.", hint="Start it again.")
@@ -317,18 +278,12 @@ class SkillRuns:
                 f"{MOST_AT_ONCE} skills are being run at once.", hint="Wait for one, or cancel it."
             )
         self._n_begun += 1
-        run = SkillRun(
-            handle=(handle := f"S{self._n_begun}"),
-            skill=skill,
-            client=None if isinstance(skill, Mission) else current_caller().session,
-            n_stops_before=self.count_stops(),
-            questions=self.questions,
-            read_clock_s=self.read_clock_s,
-        )
+        client = None if isinstance(skill, Mission) else current_caller().session
+        run = SkillRun(handle=f"S{self._n_begun}", skill=skill, client=client, runs=self)
         over = [each.handle for each in self._runs.values() if each.is_over]
         for old in over[: max(len(self._runs) + 1 - MOST_KEPT, 0)]:
             del self._runs[old]
-        self._runs[handle] = run
+        self._runs[run.handle] = run
         self._tasks.start_soon(partial(run.do, dict(arguments)))
         try:
             await run.wait(wait_s=max(wait_s, BEGINS_S), on_news=on_news)
@@ -337,19 +292,14 @@ class SkillRuns:
                 await run.cancel()
             raise
         if run.error is not None:
-            self._runs.pop(handle, None)
+            self._runs.pop(run.handle, None)
             raise run.error
         return run
 
     def find(self, handle: str | None) -> SkillRun:
-        """Return a run by its handle; the latest when none is given.
-
-        Raises:
-            SkillError: No run has that handle.
-        """
+        """Return a run by its handle, the latest without one; SkillError where there is none."""
         key = next(reversed(self._runs), "") if handle is None else handle.strip().upper()
-        run = self._runs.get(key)
-        if run is None:
+        if (run := self._runs.get(key)) is None:
             latest = ", ".join(list(self._runs)[-5:])
             raise SkillError(
                 f"No run of a skill is called {handle[:40]!r}." if handle else "No skill was run.",
@@ -359,7 +309,7 @@ class SkillRuns:
 
     async def client_is_gone(self, client: str) -> None:
         """End the runs of a client that has gone away; anyone may answer those that go on."""
-        self.questions.client_is_gone(client)
+        self.questions.gone.add(client)
         for run in self.under_way:
             if run.client == client:
                 await run.cancel()

@@ -1,7 +1,7 @@
 """skills.yaml, in which the owner declares a robot's skills; saved missions are such files too."""
 
 import io
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import StrEnum
@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -19,17 +19,17 @@ from mapspeak.settings import read_settings
 from mapspeak.skill import (
     Arguments,
     OnProgress,
-    ParameterKind,
+    Schema,
     Skill,
     SkillEffect,
     SkillOutcome,
-    SkillParameter,
     SkillSpec,
     SkillState,
     failed,
+    parameter,
 )
-from mapspeak.skills.arguments import check_arguments, check_value
-from mapspeak.skills.guarding import OF_FACTS, is_as_wanted
+from mapspeak.skills.arguments import LIMITS, check_arguments, check_value
+from mapspeak.skills.guarding import CONDITIONS, OF_FACTS, is_as_wanted
 from mapspeak.skills.steps import Step, read_tree
 
 NAME = r"^[a-z][a-z0-9_]{0,39}$"
@@ -56,6 +56,7 @@ _Words = Annotated[str, Field(max_length=300)]
 _Target = Annotated[str, Field(min_length=1, max_length=200)]
 _Plain = str | float | int | bool
 _Kind = Literal["number", "whole", "text", "flag", "list"]
+_KINDS = {"whole": "integer", "text": "string", "flag": "boolean", "list": "array"}
 _EFFECTS = {Called.READ: SkillEffect.READS, Called.MISSION: SkillEffect.MOVES}
 
 
@@ -82,55 +83,50 @@ class _Argument(_Written):
             raise ValueError(message)
         if self.default is not None:
             try:
-                check_value(self.parameter(), self.default, where="default", what=self.name)
+                check_value(self.takes, self.default, where="default", what=self.name)
             except SkillError as error:
                 raise ValueError(str(error)) from error
         return self
 
-    def parameter(self) -> SkillParameter:
-        return SkillParameter(
-            self.name,
-            ParameterKind(self.kind) if self.kind else self._guess(),
+    @property
+    def takes(self) -> Schema:
+        """What its value may be; of a list and a text `least` and `most` are counts."""
+        kind = _KINDS.get(self.kind, self.kind) if self.kind else self._guess()
+        is_count, bounds = kind in ("string", "array"), (self.least, self.most)
+        limits = (int(each) if is_count and each is not None else each for each in bounds)
+        return parameter(
+            kind,
             description=self.about,
             unit=self.unit,
-            least=self.least,
-            most=self.most,
-            choices=tuple(self.choices),
-            is_required=self.default is None,
+            **dict(zip(LIMITS.get(kind, ()), limits, strict=False)),
+            enum=self.choices or None,
             default=self.default,
+            required=self.default is None,
         )
 
-    def _guess(self) -> ParameterKind:
+    def _guess(self) -> str:
         """Return the kind that its bounds, its default or its choices show."""
         shown = self.default if self.default is not None else next(iter(self.choices), None)
-        match shown:
-            case bool():
-                return ParameterKind.FLAG
-            case str():
-                return ParameterKind.TEXT
-            case list():
-                return ParameterKind.LIST
+        for kind, shows in ((bool, "boolean"), (str, "string"), (list, "array")):
+            if isinstance(shown, kind):
+                return shows
         is_number = shown is not None or (self.least, self.most, self.unit) != (None, None, "")
-        return ParameterKind.NUMBER if is_number else ParameterKind.TEXT
+        return "number" if is_number else "string"
 
 
-class _Success(_Written):
-    field: _Target
-    by: _Name | None = None
-    equals: _Plain | None = Field(default=None, alias="is")
-    above: float | None = None
-    below: float | None = None
+def _checked(parameters: Mapping[str, Schema]) -> AfterValidator:
+    def check(given: dict[str, Any]) -> dict[str, Any]:
+        try:
+            checked = check_arguments(parameters, given, skill="it")
+        except SkillError as error:
+            raise ValueError(str(error)) from error
+        return {name: checked[name] for name in given}
 
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        if (self.equals, self.above, self.below) == (None, None, None):
-            message = "it needs one of: is, above, below"
-            raise ValueError(message)
-        return self
+    return AfterValidator(check)
 
-    def holds_in(self, result: Arguments) -> bool:
-        wanted = {"is": self.equals, "above": self.above, "below": self.below}
-        return self.field in result and is_as_wanted(result[self.field], wanted)
+
+_JUDGED = {key: CONDITIONS[key] for key in ("is", "above", "below")}
+_SUCCESS = {"field": parameter("string", required=True), "by": parameter("string"), **_JUDGED}
 
 
 class OwnersEntry(_Written):
@@ -140,7 +136,7 @@ class OwnersEntry(_Written):
         type: Given by the owner, where the robot does not tell it.
         definition: Of the type, likewise; as `ros2 interface show` prints it.
         fixed: Arguments of what it calls that are always the same.
-        succeeded_when: Conditions on the result; None where the robot's own report decides.
+        succeeded_when: Conditions on the result; empty where the robot's own report decides.
         remember: Remarks of people about it since.
     """
 
@@ -156,10 +152,10 @@ class OwnersEntry(_Written):
     definition: Annotated[str, Field(max_length=20_000)] | None = None
     fixed: dict[str, Any] = {}
     arguments: Annotated[list[_Argument], Field(max_length=40)] = []
-    succeeded_when: _Success | None = None
+    succeeded_when: Annotated[dict[str, Any], _checked(_SUCCESS)] = {}
     timeout_s: Annotated[float, Field(gt=0, le=86_400)] = USUAL_TIMEOUT_S
     within_min: Annotated[float, Field(gt=0, le=MOST_MISSION_MIN)] = USUAL_MISSION_MIN
-    needs: dict[str, Any] = {}
+    needs: Annotated[dict[str, Any], _checked(OF_FACTS)] = {}
     effect: Literal["reads", "moves", "changes"] | None = None
     approval: Literal["as_policy", "always"] = "as_policy"
     remember: list[_Words] = []
@@ -173,10 +169,9 @@ class OwnersEntry(_Written):
         if len(set(names)) != len(names):
             message = f"{self.name!r} has two arguments of one name"
             raise ValueError(message)
-        try:
-            check_arguments(OF_FACTS, self.needs, skill="needs")
-        except SkillError as error:
-            raise ValueError(str(error)) from error
+        if self.succeeded_when and not _JUDGED.keys() & self.succeeded_when.keys():
+            message = f"succeeded_when needs one of: {', '.join(_JUDGED)}"
+            raise ValueError(message)
         return self
 
     @property
@@ -203,18 +198,14 @@ class OwnersEntry(_Written):
             self.sentence,
             SkillEffect(effect),
             timeout_s=self.within_min * 60 if self.mission is not None else self.timeout_s,
-            parameters=tuple(each.parameter() for each in self.arguments),
+            parameters={each.name: each.takes for each in self.arguments},
             needs=self.needs,
             is_always_asked=self.approval == "always",
         )
 
     @cached_property
     def tree(self) -> Step:
-        """The steps of a mission.
-
-        Raises:
-            SkillError: They have a mistake.
-        """
+        """The steps of a mission; SkillError where they have a mistake."""
         return read_tree(self.mission)
 
     async def run(
@@ -224,21 +215,17 @@ class OwnersEntry(_Written):
         arguments: Arguments,
         on_progress: OnProgress,
     ) -> SkillOutcome:
-        """Call what it names, and say that it has failed where the owner's condition does not hold.
-
-        Raises:
-            MapspeakError: The robot does not offer it, or an argument does not fit there.
-        """
+        """Call what it names; where the owner's condition does not hold then, it has failed."""
         called, sets = await open_called(), self.sets
         named = {sets[name]: value for name, value in arguments.items()}
         outcome = await called.run({**self.fixed, **named}, on_progress)
-        success = self.succeeded_when
-        if success is None or outcome.state is not SkillState.SUCCEEDED:
+        wanted, result = self.succeeded_when, outcome.outputs
+        if not wanted or outcome.state is not SkillState.SUCCEEDED:
             return outcome
-        result = outcome.outputs
-        if success.by:
-            result = (await find_skill(success.by).run({}, lambda _: None)).outputs
-        return outcome if success.holds_in(result) else replace(failed(), outputs=outcome.outputs)
+        if judge := wanted.get("by"):
+            result = (await find_skill(judge).run({}, lambda _: None)).outputs
+        has_succeeded = wanted["field"] in result and is_as_wanted(result[wanted["field"]], wanted)
+        return outcome if has_succeeded else replace(failed(), outputs=outcome.outputs)
 
 
 class _SkillsFile(_Written):
@@ -248,19 +235,16 @@ class _SkillsFile(_Written):
 def load_skills(path: Path) -> tuple[OwnersEntry, ...]:
     """Read skills.yaml, or a file that ships, by its name: nav2, move_base.
 
-    Raises:
-        ConfigError: It cannot be read, or has a mistake; says the line and the reason.
+    ConfigError says the line and the reason of a mistake.
     """
     if str(path) in READY_MADE and not path.exists():
         path = Path(__file__).with_name("data") / f"{path}.yaml"
     entries = read_settings(path, _SkillsFile, name="skills.yaml", advice=ADVICE).skills
-    names: set[str] = set()
+    names = [each.name for each in entries]
     for each in entries:
-        if each.name in names:
-            raise ConfigError(
-                f"{path}: two skills are called {each.name}.", hint="Rename one of them."
-            )
-        names.add(each.name)
+        if names.count(each.name) > 1:
+            said = f"{path}: two skills are called {each.name}."
+            raise ConfigError(said, hint="Rename one of them.")
         try:
             _ = each.mission is None or each.tree
         except SkillError as error:
@@ -272,8 +256,7 @@ def load_skills(path: Path) -> tuple[OwnersEntry, ...]:
 def add_correction(path: Path, name: str, correction: str) -> None:
     """Keep a person's remark about a skill in its file, and leave the rest as it is written there.
 
-    Raises:
-        ConfigError: The file cannot be read or written.
+    ConfigError where the file cannot be read or written.
     """
     with _changing(path):
         tree = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
@@ -284,11 +267,7 @@ def add_correction(path: Path, name: str, correction: str) -> None:
 
 
 def write_skills(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
-    """Write a file of skills, as its owner would have.
-
-    Raises:
-        ConfigError: It could not be written.
-    """
+    """Write a file of skills as its owner would have; ConfigError where that cannot be."""
     text = io.StringIO()
     YAML(typ="rt").dump(tree, text)
     with _changing(path):
@@ -296,11 +275,7 @@ def write_skills(path: Path, tree: Any) -> None:  # noqa: ANN401 - YAML
 
 
 def set_aside(path: Path) -> Path:
-    """Rename a saved mission's file, so that it is read no more; return what it is called now.
-
-    Raises:
-        ConfigError: The file cannot be renamed.
-    """
+    """Rename a saved mission's file, so that it is read no more, or raise ConfigError."""
     with _changing(path):
         return path.replace(path.with_name(f"{path.name}.forgotten"))
 

@@ -1,9 +1,10 @@
 """A mission as a tree of steps, read from what a model or a person wrote: faults by line."""
 
+import itertools
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import SkillError
-from mapspeak.skill import Arguments, JsonValue, Skill, SkillSpec
-from mapspeak.skills.arguments import plain
+from mapspeak.skill import Arguments, JsonValue, Schema, Skill, SkillSpec, parameter
+from mapspeak.skills.arguments import check_arguments, plain
 
 TEMPLATE = re.compile(r"\{([a-z][a-z0-9_]*)(?:\.([A-Za-z0-9_]+))?\}")
 MOST_STEPS = 300
 DEEPEST = 16
-MOST_TIMES = 1000
-MOST_S = 86_400
 MOST_TEXT = 30_000
 MOST_NAME = 40
 
@@ -72,16 +71,12 @@ class Step:
             yield from each.walk()
 
     def name_arguments(self, spec: SkillSpec) -> dict[str, JsonValue]:
-        """Return a leaf's arguments by name.
-
-        Raises:
-            SkillError: The skill takes none, or is given one twice.
-        """
+        """Return a leaf's arguments by name; SkillError where it takes none, or one twice."""
         if self.main is None:
             return dict(self.arguments)
         if not spec.parameters:
             raise SkillError(f"{spec.name} takes nothing.", hint=f"Write only `{spec.name}`.")
-        first = spec.parameters[0].name
+        first = next(iter(spec.parameters))
         if first in self.arguments:
             raise SkillError(f"{spec.name} is given {first} twice.", hint="Leave one out.")
         return {first: self.main, **self.arguments}
@@ -93,30 +88,37 @@ class Mission(Skill):
 
     Attributes:
         remember: Remarks of people about it since it was saved.
-        path: The file that it is saved in; None for one that is not.
     """
 
     tree: Step
     remember: tuple[str, ...] = ()
-    path: Path | None = None
+    path: Path = Path()
 
 
-CONTROL = frozenset(StepKind) - {StepKind.LEAF}
-OPTIONS: Mapping[StepKind, frozenset[str]] = {
-    **dict.fromkeys((StepKind.SEQUENCE, StepKind.FALLBACK), frozenset[str]()),
-    StepKind.PARALLEL: frozenset({"needs"}),
-    **dict.fromkeys((StepKind.RETRY, StepKind.TIMEOUT, StepKind.REPEAT), frozenset({"do"})),
-    **dict.fromkeys((StepKind.EVERY, StepKind.UNTIL), frozenset({"do", "times"})),
+MOST_S, MOST_TIMES = 86_400, 1000
+_STEPS, _STEP = parameter("array", minItems=1), {"required": True}
+_SPAN = parameter("number", minimum=0.001, maximum=MOST_S)
+_TIMES = parameter("integer", minimum=1, maximum=MOST_TIMES)
+FORMS: Mapping[StepKind, Mapping[str, Schema]] = {
+    StepKind.SEQUENCE: {"sequence": _STEPS},
+    StepKind.FALLBACK: {"fallback": _STEPS},
+    StepKind.PARALLEL: {
+        "parallel": _STEPS,
+        "needs": parameter("string", enum=["all", "one"], default="all"),
+    },
+    StepKind.RETRY: {"retry": _TIMES, "do": _STEP},
+    StepKind.REPEAT: {"repeat": _TIMES, "do": _STEP},
+    StepKind.TIMEOUT: {"timeout_s": _SPAN, "do": _STEP},
+    StepKind.EVERY: {"every_min": _SPAN, "times": {**_TIMES, "default": 24}, "do": _STEP},
+    StepKind.UNTIL: {"until": {}, "times": {**_TIMES, "default": 10}, "do": _STEP},
 }
+"""What stands in a step that holds steps."""
+CONTROL = frozenset(FORMS)
 FORM = "Write each step as `skill: argument`, or as one of " + ", ".join(sorted(CONTROL)) + "."
 
 
 def parse_tree(written: object) -> Any:  # noqa: ANN401 - whatever was written
-    """Return the value of a text in YAML or JSON; a value read from JSON before is taken too.
-
-    Raises:
-        SkillError: It is neither, or too long.
-    """
+    """Return the value of a text in YAML or JSON, or of JSON read before; SkillError for others."""
     text = written if isinstance(written, str) else json.dumps(written, default=str)
     if len(text) > MOST_TEXT:
         raise SkillError(
@@ -133,87 +135,50 @@ def parse_tree(written: object) -> Any:  # noqa: ANN401 - whatever was written
 
 
 def read_tree(written: object) -> Step:
-    """Return a mission as steps.
-
-    Raises:
-        SkillError: It has a mistake; says the line where that is known.
-    """
-    return _Reader().read(written, 0)
+    """Return a mission as steps, or raise SkillError with the line of a mistake, where known."""
+    return _read(written, itertools.count(1), 0)
 
 
-class _Reader:
-    def __init__(self) -> None:
-        self._n_steps = 0
-
-    def read(self, written: object, depth: int) -> Step:
-        """Read one step; a list is a sequence, a word a skill that is given nothing."""
-        self._n_steps += 1
-        number = self._n_steps
-        if number > MOST_STEPS:
-            raise _fault(written, f"the mission has more than {MOST_STEPS} steps")
-        if depth > DEEPEST:
-            raise _fault(written, f"the mission is more than {DEEPEST} steps deep, or holds itself")
-        if isinstance(written, str):
-            return Step(kind=StepKind.LEAF, number=number, skill=_name(written, written))
-        if isinstance(written, list):
-            return self._many(StepKind.SEQUENCE, written, written, number, depth)
-        if not isinstance(written, Mapping) or not written:
-            shown = "an empty step" if isinstance(written, Mapping) else _shown(written)
-            raise _fault(written, f"{shown} is no step")
-        kind = next((StepKind(key) for key in written if key in CONTROL), None)
-        if kind is None:
-            return _leaf(written, number)
-        if strangers := [str(key) for key in written if key not in (kind, *OPTIONS[kind])]:
-            raise _fault(written, f"{strangers[0][:MOST_NAME]!r} does not belong to {kind}")
-        if "do" in OPTIONS[kind]:
-            return self._one(kind, written, number, depth)
-        return self._many(kind, written[kind], written, number, depth)
-
-    def _many(
-        self, kind: StepKind, steps: object, written: object, number: int, depth: int
-    ) -> Step:
-        if not isinstance(steps, list) or not steps:
-            raise _fault(written, f"{kind} needs a list of steps")
-        needs = written.get("needs", "all") if isinstance(written, Mapping) else "all"
-        if needs not in ("all", "one"):
-            raise _fault(written, "needs is all or one")
-        read = tuple(self.read(each, depth + 1) for each in steps)
-        return Step(kind=kind, number=number, steps=read, needs_all=needs == "all")
-
-    def _one(self, kind: StepKind, written: Mapping[str, Any], number: int, depth: int) -> Step:
-        if "do" not in written:
-            raise _fault(written, f"{kind} needs `do`, the step that it is about")
-        steps: tuple[Step, ...] = (self.read(written["do"], depth + 1),)
-        limit, times = 0.0, 1.0
-        match kind:
-            case StepKind.TIMEOUT:
-                limit = _number(written, kind, most=MOST_S)
-            case StepKind.EVERY:
-                limit = _number(written, kind, most=MOST_S)
-                times = _number(written, "times", most=MOST_TIMES, default=24)
-            case StepKind.UNTIL:
-                steps = (*steps, self.read({"check": written[kind]}, depth + 1))
-                times = _number(written, "times", most=MOST_TIMES, default=10)
-            case _:
-                times = _number(written, kind, most=MOST_TIMES)
-        return Step(kind=kind, number=number, steps=steps, limit=limit, times=int(times))
+def _read(written: object, numbers: Iterator[int], depth: int) -> Step:
+    """Read one step; a list is a sequence, a word a skill that is given nothing."""
+    number = next(numbers)
+    if number > MOST_STEPS:
+        raise _fault(written, f"the mission has more than {MOST_STEPS} steps")
+    if depth > DEEPEST:
+        raise _fault(written, f"the mission is more than {DEEPEST} steps deep, or holds itself")
+    form = {StepKind.SEQUENCE: written} if isinstance(written, list) else written
+    if isinstance(form, str):
+        return Step(kind=StepKind.LEAF, number=number, skill=_name(form, written))
+    if not isinstance(form, Mapping) or not form:
+        shown = "an empty step" if isinstance(form, Mapping) else _shown(form)
+        raise _fault(written, f"{shown} is no step")
+    kind = next((StepKind(key) for key in form if key in CONTROL), None)
+    if kind is None:
+        return _read_leaf(form, number)
+    given = check_arguments(FORMS[kind], form, skill=f"{_find_line(written)}{kind}")
+    within = given[kind] if "do" not in given else [given["do"]]
+    if kind is StepKind.UNTIL:
+        within.append({"check": given[kind]})
+    return Step(
+        kind=kind,
+        number=number,
+        steps=tuple(_read(each, numbers, depth + 1) for each in within),
+        limit=given[kind] if FORMS[kind][kind] is _SPAN else 0.0,
+        times=given[kind] if FORMS[kind][kind] is _TIMES else given.get("times", 1),
+        needs_all=given.get("needs") != "one",
+    )
 
 
-def _leaf(written: Mapping[str, Any], number: int) -> Step:
+def _read_leaf(written: Mapping[str, Any], number: int) -> Step:
     # Some clients sort the names of JSON.
     first, *others = sorted(written, key=lambda key: key == "as")
     given, output = _plain(written[first]), written.get("as", "")
     named = {str(key): _plain(written[key]) for key in others if key != "as"}
     if isinstance(given, Mapping):
         named, given = {**given, **named}, None
-    return Step(
-        kind=StepKind.LEAF,
-        number=number,
-        skill=_name(first, written),
-        main=given,
-        arguments=named,
-        output=_name(output, written) if output else "",
-    )
+    leaf = Step(kind=StepKind.LEAF, number=number, skill=_name(first, written))
+    output = _name(output, written) if output else ""
+    return replace(leaf, main=given, arguments=named, output=output)
 
 
 def _plain(value: object) -> JsonValue:
@@ -230,20 +195,13 @@ def _name(name: object, written: object) -> str:
     return name
 
 
-def _number(
-    written: Mapping[str, Any], key: str, *, most: float, default: float | None = None
-) -> float:
-    value = written.get(key, default)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not 0 < value <= most:
-        raise _fault(written, f"{key} cannot be {_shown(value)}: give a number up to {most:g}")
-    return float(value)
+def _find_line(written: object) -> str:
+    place = getattr(written, "lc", None)
+    return "" if place is None or place.line is None else f"Line {place.line + 1}: "
 
 
 def _fault(written: object, what: str) -> SkillError:
-    place = getattr(written, "lc", None)
-    line = f"Line {place.line + 1}: " if place is not None and place.line is not None else ""
-    return SkillError(f"{line}{what}.", hint=FORM)
+    return SkillError(f"{_find_line(written)}{what}.", hint=FORM)
 
 
 def _shown(value: object) -> str:
@@ -256,11 +214,7 @@ def find_names(value: JsonValue) -> set[str]:
 
 
 def fill_in(value: JsonValue, values: Arguments) -> JsonValue:
-    """Return a value with what its texts name; a text that is one name alone becomes that value.
-
-    Raises:
-        SkillError: A result has no field of that name.
-    """
+    """Return a value with what its texts name, or raise SkillError; a name alone is its value."""
     match value:
         case str():
             whole = TEMPLATE.fullmatch(value)

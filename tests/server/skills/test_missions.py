@@ -17,14 +17,7 @@ from mapspeak.errors import ConfigError
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.server.text.world.drives import say_cause
-from mapspeak.skill import (
-    JsonValue,
-    ParameterKind,
-    SkillCode,
-    SkillOutcome,
-    SkillParameter,
-    SkillState,
-)
+from mapspeak.skill import JsonValue, SkillCode, SkillOutcome, SkillState, parameter
 from mapspeak.skills.guarding import CONDITIONS
 from mapspeak.skills.steps import CONTROL
 from missioning import missions
@@ -74,7 +67,7 @@ async def test_results_are_passed_on_by_name_and_decide(tmp_path: Path) -> None:
     speak = FakeSkill(
         spec(
             "speak",
-            parameters=(SkillParameter(name="words", kind=ParameterKind.TEXT, is_required=True),),
+            parameters={"words": parameter("string", required=True)},
         )
     )
     tree = """
@@ -404,8 +397,7 @@ skills:
 async def test_what_an_owner_says_of_a_skill_of_the_robot_holds_for_the_tool_of_that_name(
     tmp_path: Path,
 ) -> None:
-    percent = SkillParameter("until_percent", ParameterKind.NUMBER)
-    dock = FakeSkill(spec("dock", parameters=(percent,)))
+    dock = FakeSkill(spec("dock", parameters={"until_percent": parameter("number")}))
     written = "skills:\n- {name: dock, robot_skill: dock, fixed: {until_percent: 80}}\n"
     async with missions(tmp_path, dock, skills_file=written) as caller:
         await caller.ask("dock")
@@ -549,7 +541,7 @@ async def test_a_skill_with_a_mistake_in_it_ends_the_mission_and_nothing_drives_
     [
         ("&a\n- drive: R2\n- sequence: *a", "holds itself"),
         ("sequence: [" + "look, " * 400 + "look]", "more than 300 steps"),
-        ("", "needs a list of steps"),
+        ("", "Give a list of at least 1"),
         ("- fly: away", "There is no skill 'fly'"),
         ("- dirve: R1", "There is no skill 'dirve'. Did you mean drive?"),
         ("- drive: '{door.room}'", "which no step before gives"),
@@ -720,7 +712,7 @@ async def test_a_model_reads_the_whole_language_of_missions_in_the_tool_that_run
     asked = {"answers", "otherwise", "within_s", "as", "do", "times", "needs"}
     words = set(re.findall(r"[a-z_]+", said))
     assert {*CONTROL, *leaves, *asked} <= words
-    assert {each.name for each in CONDITIONS} <= words
+    assert {*CONDITIONS} <= words
 
 
 async def test_the_schemas_of_the_tools_are_flat(tmp_path: Path) -> None:

@@ -7,11 +7,11 @@ from typing import Annotated
 from mcp.server.mcpserver import Context, Image
 from pydantic import Field
 
-from mapspeak.driving.drivereport import DriveReport
+from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.exploration.camera import aim, end_for_picture, scope_of
 from mapspeak.driving.exploration.trips import TURN, spread_headings, turn_to
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.places.relations.choosing import GoalPurpose
+from mapspeak.places.relations.choosing import CheckedGoal, GoalPurpose
 from mapspeak.places.relations.viewpoints import choose_view, is_there
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import ApprovalScope, current_caller, within_scope
@@ -29,6 +29,7 @@ from mapspeak.server.tools.places import OnePlace
 from mapspeak.server.tools.sightings import Camera, look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
+from mapspeak.worldmodel.model import WorldModel
 
 Place = Annotated[
     str | None,
@@ -196,23 +197,16 @@ class ViewTools:
         Use it to check a place: it says how much is in view, and what should be where.
         """
         session = self._session
-        half_view_rad, begun_s = session.pictures.half_view_rad, session.robot.now_s
-        with session.drives.preparing() as ticket:
-            world = await session.fetch_world_model()
-            goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
-            if not is_there(world.robot, goal.pose):
-                drive = await session.drives.start(
-                    goal.pose,
-                    place=f"a view of {goal.title}",
-                    ticket=ticket,
-                )
-                report = await session.drives.wait(
-                    drive.goal_id, wait_s=wait_s, on_progress=tell_progress(context)
-                )
-                if report.status.state is not GoalState.ARRIVED:
-                    way_m = world.path_m(goal.pose.point) or 0.0
-                    waited_s = session.robot.now_s - begun_s
-                    return [_say_no_view(report, way_m=way_m, waited_s=waited_s)]
+        begun_s = session.robot.now_s
+        world, goal, drive = await drive_to_view(session, place)
+        if drive is not None:
+            report = await session.drives.wait(
+                drive.goal_id, wait_s=wait_s, on_progress=tell_progress(context)
+            )
+            if report.status.state is not GoalState.ARRIVED:
+                way_m = world.path_m(goal.pose.point) or 0.0
+                waited_s = session.robot.now_s - begun_s
+                return [_say_no_view(report, way_m=way_m, waited_s=waited_s)]
         sighting = await look_ahead(session)
         world = await session.fetch_world_model()
         text = await session.compute(lambda: describe_view(world, goal.place, sighting.picture))
@@ -300,6 +294,19 @@ class ViewTools:
             on_progress=tell_progress(context),
             what=what,
         )
+
+
+async def drive_to_view(
+    session: Session, place: str
+) -> tuple[WorldModel, CheckedGoal, Drive | None]:
+    """Send the robot to a clear view of a place; without a drive where it is there already."""
+    with session.drives.preparing() as ticket:
+        world, half_view_rad = await session.fetch_world_model(), session.pictures.half_view_rad
+        goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
+        if is_there(world.robot, goal.pose):
+            return world, goal, None
+        title = f"a view of {goal.title}"
+        return world, goal, await session.drives.start(goal.pose, place=title, ticket=ticket)
 
 
 def _scope_of(place: str, purpose: GoalPurpose) -> AbstractContextManager[None]:

@@ -1,27 +1,37 @@
 """All skills of one server by their names: built in, the robot's own, its owner's, missions."""
 
 import logging
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from mcp_types import Tool as ListedTool
+from mcp_types import ToolAnnotations
 
 from mapspeak.errors import ConfigError, MapspeakError, SkillError, say_nearest
 from mapspeak.memory.episodes.store import memory_folder
+from mapspeak.memory.quoting import quote
+from mapspeak.server.text.skills.words import describe_skill
+from mapspeak.server.tools.caller import LONGEST_WAIT_S
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
-from mapspeak.server.tools.skills.calling import list_skill
 from mapspeak.server.tools.skills.interfaces import Interface, open_interface
-from mapspeak.server.tools.skills.leaves import Leaves, SessionFacts
+from mapspeak.server.tools.skills.leaves import Leaves
 from mapspeak.session import Session
-from mapspeak.skill import Skill, SkillEffect
+from mapspeak.skill import Skill, SkillEffect, parameter
+from mapspeak.skills.arguments import schema_of
 from mapspeak.skills.guarding import SkillGate
-from mapspeak.skills.missionrecord import MissionRecord
-from mapspeak.skills.missionrunner import MissionDesk
+from mapspeak.skills.missions import MissionDesk, MissionRecord
 from mapspeak.skills.runs import SkillRuns
 from mapspeak.skills.skillsfile import Called, OwnersEntry, load_skills
 from mapspeak.skills.steps import CONTROL, Mission
 
+WAIT = "wait_s"
+WAITS = parameter(
+    "number", unit="s to wait for its end", minimum=0.0, maximum=LONGEST_WAIT_S, default=10.0
+)
+"""What the tool of a skill takes that may last longer than a call."""
+MOST_TITLE = 60
 logger = logging.getLogger(__name__)
 
 
@@ -29,7 +39,7 @@ class SkillBook:
     """Knows every skill, keeps saved missions as files, and tells which skills are tools.
 
     Args:
-        entries: Of the owner's skills.yaml.
+        entries: Of the owner's skills.yaml; ConfigError for one that is a word of missions.
 
     Attributes:
         folder: Where missions are saved.
@@ -43,7 +53,6 @@ class SkillBook:
     ) -> None:
         self._ros, self.session = ros, session
         self.runs = SkillRuns(partial(_count_stops, session), lambda: session.robot.now_s)
-        self.exposed: dict[str, Skill] = {}
         self._tools: Collection[str] = ()
         self._are_tools = self._is_read_only = False
         self._listed: dict[Skill, ListedTool] = {}
@@ -52,21 +61,22 @@ class SkillBook:
         self.interrupted = record.take_interrupted()
         for each in self.interrupted:
             logger.warning("The mission %s was interrupted: its server ended.", each.name)
-        facts = SessionFacts(session, ros)
-        self._gate = SkillGate(facts, session.guard)
-        present, begins = session.client_is_heard, self.runs.questions.forget_pictures
-        self.desk = MissionDesk(self.find, self._gate, record, present, begins)
-        leaves = Leaves(session, facts, self.runs.questions).list_skills()
-        self._built_in = _by_name(self._gate.hold(each, is_through_guard=True) for each in leaves)
+        leaves = Leaves(session, ros, self.runs.questions)
+        self._gate = gate = SkillGate(leaves, session.guard)
+        present, begins = session.client_is_heard, self.runs.questions.pictures.clear
+        self.desk = MissionDesk(self.find, gate, record, present, begins)
         own = () if session.skilled is None else session.skilled.build_skills(session.robot)
-        self._own = _by_name(self._gate.hold(each) for each in own)
+        built_in = (gate.hold(each, is_through_guard=True) for each in leaves.list_skills())
+        self._built_in = {each.spec.name: each for each in built_in}
+        self._own = {each.spec.name: gate.hold(each) for each in own}
+        self._owned: dict[str, Skill] = {}
+        self.exposed: dict[str, Skill] = {}
+        self.saved: dict[str, Mission] = {}
         for entry in entries:
             if entry.name in (*self._built_in, *CONTROL):
-                raise ConfigError(
-                    f"skills.yaml: {entry.name!r} is a word of missions.", hint="Rename the skill."
-                )
-        self._owned = _by_name(self._open(each) for each in entries)
-        self.saved: dict[str, Mission] = {}
+                said = f"skills.yaml: {entry.name!r} is a word of missions."
+                raise ConfigError(said, hint="Rename the skill.")
+            self._owned[entry.name] = self._open(entry)
         self.load_saved()
 
     @property
@@ -91,13 +101,8 @@ class SkillBook:
         return {*self._tools, *self.offered}
 
     def find(self, name: str) -> Skill:
-        """Return a skill by its name.
-
-        Raises:
-            SkillError: There is none of that name now.
-        """
-        found = self.skills.get(name)
-        if found is None:
+        """Return a skill by its name; SkillError where there is none now."""
+        if (found := self.skills.get(name)) is None:
             hint = say_nearest(name, self.skills).rstrip()
             hint = hint or f"There are: {', '.join(self.skills)}."
             raise SkillError(f"There is no skill {name[:60]!r}.", hint=hint)
@@ -106,20 +111,15 @@ class SkillBook:
     def offer(self, *, beside: Collection[str], is_read_only: bool) -> None:
         """Offer the robot's own skills, the owner's and the saved missions as tools.
 
-        Args:
-            beside: The names of the tools that are no skills; a skill of such a name is no tool.
-            is_read_only: Only skills that read are tools.
-
-        Raises:
-            ConfigError: An owner's skill has such a name.
+        `beside` are the names of other tools: a skill of such a name is no tool, and an owner's
+        raises ConfigError. Only skills that read are tools where all `is_read_only`.
         """
         self._tools, self._is_read_only, self._are_tools = beside, is_read_only, True
-        for name in (*self._owned, *self._own):
-            if name in beside:
-                said = f"{name!r} is a tool, and no skill's name."
-                if name in self._owned:
-                    raise ConfigError(f"skills.yaml: {said}", hint="Rename it.")
-                logger.warning("%s", said)
+        for name in (each for each in (*self._owned, *self._own) if each in beside):
+            said = f"{name!r} is a tool, and no skill's name."
+            if name in self._owned:
+                raise ConfigError(f"skills.yaml: {said}", hint="Rename it.")
+            logger.warning("%s", said)
         self.load_saved()
 
     def list_tools(self) -> list[ListedTool]:
@@ -129,11 +129,11 @@ class SkillBook:
         return list(self._listed.values())
 
     def load_saved(self) -> None:
-        """Read the saved missions anew; people may have edited the files.
+        """Read the saved missions anew, for people may have edited the files.
 
         One that is called as another skill or tool takes no place of it.
         """
-        saved: dict[str, Mission] = {}
+        self.saved = {}
         for path in sorted(self.folder.glob("*.yaml")):
             try:
                 entries = load_skills(path)
@@ -143,18 +143,12 @@ class SkillBook:
             for each in (entry for entry in entries if entry.calls is Called.MISSION):
                 try:
                     self.check_free(each.name)
+                    self.saved[each.name] = self.desk.open(each, path)
                 except SkillError as error:
                     logger.warning("%s: %s", path, error)
-                    continue
-                saved[each.name] = self.desk.open(each, path)
-        self.saved = saved
 
     def check_free(self, name: str) -> None:
-        """Return when a mission may be saved under a name.
-
-        Raises:
-            SkillError: A tool, another skill, or a word of the language of missions, has it.
-        """
+        """Raise SkillError where a tool, a skill or a word of missions has a mission's name."""
         others = (self._built_in, self._own, self._owned, self.exposed)
         if any(name in each for each in (*others, CONTROL, self._tools)):
             raise SkillError(f"{name!r} is taken.", hint="Choose another name.")
@@ -168,18 +162,11 @@ class SkillBook:
         return self._gate.hold(Skill(entry.spec, run), is_through_guard=is_ros)
 
     async def open_called(self, entry: OwnersEntry) -> Skill:
-        """Return the interface that a skill of skills.yaml calls, as the robot offers it now.
-
-        Raises:
-            MapspeakError: The robot does not offer it.
-        """
+        """Return what a skill of skills.yaml calls; MapspeakError where that is not offered now."""
         if entry.calls is Called.ROBOT_SKILL:
-            own = self._own.get(entry.target)
-            if own is None:
-                raise SkillError(
-                    f"The robot has no skill {entry.target!r}.",
-                    hint=f"It has: {', '.join(self._own) or 'none'}.",
-                )
+            if (own := self._own.get(entry.target)) is None:
+                hint = f"It has: {', '.join(self._own) or 'none'}."
+                raise SkillError(f"The robot has no skill {entry.target!r}.", hint=hint)
             return own
         name, inquiry = full_name(entry.target), self._ros.inquiry
         fetches: dict[Called, Callable[[str], Awaitable[str]]] = {
@@ -191,7 +178,12 @@ class SkillBook:
             await inquiry.teach(type_name, entry.definition)
         interface = Interface(entry.calls, name, type_name)
         timeout_s = entry.timeout_s if "timeout_s" in entry.model_fields_set else None
-        return await open_interface(interface, self._ros, name=entry.name, timeout_s=timeout_s)
+        return await self.open_interface(interface, name=entry.name, timeout_s=timeout_s)
+
+    async def open_interface(self, interface: Interface, **known: Any) -> Skill:  # noqa: ANN401
+        """Return an interface of the robot as a skill; each command of it passes the guard."""
+        skill = await open_interface(interface, self._ros, **known)
+        return self._gate.hold(skill, is_through_guard=True)
 
     async def check_entry(self, entry: OwnersEntry) -> str:
         """Return the fault of a skill of skills.yaml at this robot; empty without one."""
@@ -199,21 +191,35 @@ class SkillBook:
             if entry.calls is Called.MISSION:
                 self.desk.check(self.desk.open(entry))
                 return ""
-            called = await self.open_called(entry)
+            takes = (await self.open_called(entry)).spec.parameters
         except MapspeakError as error:
             return str(error)
-        takes = {each.name for each in called.spec.parameters}
-        if strangers := {*entry.fixed, *entry.sets.values()} - takes:
+        if strangers := {*entry.fixed, *entry.sets.values()} - takes.keys():
             has = ", ".join(sorted(takes)) or "nothing"
             return f"{entry.target} takes no {', '.join(sorted(strangers))}. It takes {has}."
         return ""
-
-
-def _by_name(skills: Iterable[Skill]) -> dict[str, Skill]:
-    return {each.spec.name: each for each in skills}
 
 
 def _count_stops(session: Session) -> int:
     """Return a number that changes when the robot is stopped or held."""
     is_held = session.guard is not None and session.guard.hold.read() is not None
     return 2 * session.drives.n_stops + is_held
+
+
+def list_skill(skill: Skill) -> ListedTool:
+    """Return a skill as clients are told of it."""
+    spec = skill.spec
+    reads = spec.effect is SkillEffect.READS
+    acts = ToolAnnotations(open_world_hint=False)
+    return ListedTool(
+        name=spec.name,
+        title=quote(spec.description or spec.name, most=MOST_TITLE).strip('"'),
+        description=describe_skill(skill),
+        input_schema=schema_of({**spec.parameters, **({WAIT: WAITS} if is_long(skill) else {})}),
+        annotations=ToolAnnotations(read_only_hint=True) if reads else acts,
+    )
+
+
+def is_long(skill: Skill) -> bool:
+    """Return True for a skill that may last longer than one call of a tool."""
+    return skill.spec.timeout_s > LONGEST_WAIT_S

@@ -1,31 +1,38 @@
-"""The tools of missions: run, answer, save, show, forget."""
+"""The tools of skills and missions: call, ask, cancel; run, answer, save, show, forget."""
 
 import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from mcp.server.mcpserver import Context, Image
+from mcp.server.mcpserver.exceptions import ToolError
+from mcp_types import CallToolResult, TextContent
 from pydantic import Field, WithJsonSchema
 
-from mapspeak.errors import GoalError, LinkError, MapError, SkillError
+from mapspeak.errors import GoalError, LinkError, MapError, MapspeakError, SkillError
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.safety import current_caller
-from mapspeak.server.text.skills import (
+from mapspeak.server.text.offered import say_error
+from mapspeak.server.text.skills.words import (
     say_bounds,
     say_interrupted,
     say_mission,
     say_question,
+    say_run,
     say_skills,
 )
-from mapspeak.server.tools.caller import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S
-from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.calling import say_run, tell_news
+from mapspeak.server.text.wording import say_count
+from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, find_reader, shorten_wait
+from mapspeak.server.tools.skills.book import WAIT, WAITS, SkillBook, is_long
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.skill import Arguments, JsonValue, ParameterKind, SkillSpec
-from mapspeak.skills.bounds import MissionBounds
+from mapspeak.skill import Arguments, JsonValue, Skill, SkillSpec
+from mapspeak.skills.arguments import check_value
+from mapspeak.skills.missions import MissionBounds
+from mapspeak.skills.runs import OnNews, SkillRun, SkillRuns
 from mapspeak.skills.skillsfile import (
     MOST_MISSION_MIN,
     NAME,
@@ -55,17 +62,92 @@ Parameters = Annotated[
     ),
 ]
 Minutes = Annotated[float, Field(description="it ends after so long", gt=0, le=MOST_MISSION_MIN)]
-Wait = Annotated[
-    float,
-    Field(description="seconds to wait for its end or a question", ge=0, le=LONGEST_WAIT_S),
-    AT_MOST_LONGEST_WAIT,
-]
 Sentence = Annotated[str, Field(description="what it does", max_length=300)]
 Correction = Annotated[
     str | None, Field(description="what a person wants of it, such as: knock first", max_length=300)
 ]
 QuestionId = Annotated[str | None, Field(description="such as Q1; else the oldest", max_length=20)]
 Answer = Annotated[str | None, Field(description="left out, it shows the question", max_length=300)]
+Handle = Annotated[
+    str | None, Field(description="such as S1; the latest when left out", max_length=40)
+]
+
+
+class SkillRunTools:
+    """Asking and cancelling; each skill is a tool of its own."""
+
+    def __init__(self, runs: SkillRuns) -> None:
+        self._runs = runs
+        self._told: tuple[str, str, Sequence[str]] | None = None
+        # The reader of the last answer, the run under way that it told of, and its steps.
+
+    @tool("How a skill stands", ToolEffect.READS)
+    async def skill_status(
+        self, context: Context, run: Handle = None, wait_s: WaitForEnd = 0.0
+    ) -> str:
+        """Say how a run of a skill stands: state, progress, result, also long after.
+
+        Use it to wait for the end.
+        """
+        found, reader = self._runs.find(run), find_reader(context)
+        await found.wait(wait_s=wait_s, on_news=tell_news(context))
+        before, self._told = self._told, None
+        told = before[2] if before and before[:2] == (reader, found.handle) else ()
+        if reader is not None and not found.is_over:
+            self._told = reader, found.handle, found.progress.account
+        return say_run(found, () if found.is_over else told)
+
+    @tool(
+        "Cancel a skill",
+        ToolEffect.STOPS,
+        leads="Use {stop_robot} instead when anything is urgent.",
+    )
+    async def cancel_skill(self, run: Handle = None) -> str:
+        """Cancel a run of a skill; nothing of it goes on at the robot then."""
+        found = self._runs.find(run)
+        if found.is_over:
+            over = "It was over already, nothing was cancelled."
+            return f"{over}\n{say_run(found)}"
+        await found.cancel()
+        return say_run(found)
+
+
+def tell_news(context: Context) -> OnNews:
+    """Return the function that reports progress to a caller."""
+    told = ""
+
+    async def tell(run: SkillRun) -> None:
+        nonlocal told
+        signs = f"{say_count(run.n_progress, 'sign')} of progress"
+        # Of a mission a step is told once, however long it goes on.
+        steps = run.progress.account
+        said = f"{run.handle} {run.state}, {steps[-1] if steps else signs}"
+        if said != told:
+            told = said
+            await context.report_progress(run.passed_s, message=said)
+
+    return tell
+
+
+async def call_skill(
+    skill: Skill,
+    arguments: Mapping[str, Any],
+    *,
+    runs: SkillRuns,
+    context: Context[Any, Any] | None,
+) -> CallToolResult:
+    """Run a skill, and answer how it ended or, where it takes long, how its run is called."""
+    own, wait_s = dict(arguments), LONGEST_WAIT_S
+    try:
+        if is_long(skill):
+            given = shorten_wait(own.pop(WAIT, WAITS["default"]))
+            wait_s = check_value(WAITS, given, where=WAIT, what=skill.spec.name)
+        run = await runs.begin(
+            skill, own, wait_s=wait_s, on_news=None if context is None else tell_news(context)
+        )
+    except MapspeakError as error:
+        raise ToolError(say_error(error)) from error
+    return CallToolResult(content=[TextContent(type="text", text=say_run(run))])
 
 
 class MissionTools:
@@ -88,7 +170,7 @@ class MissionTools:
         name: SavedName = None,
         values: Values = None,
         within_min: Minutes = USUAL_MISSION_MIN,
-        wait_s: Wait = 10.0,
+        wait_s: WaitForEnd = 10.0,
     ) -> str:
         """Run a tree of steps that may move the robot, by itself, until it ends.
 
@@ -106,8 +188,7 @@ class MissionTools:
         if (tree is None) == (name is None):
             raise SkillError("A mission is either a tree or a name.", hint="Give one of them.")
         if name is None:
-            written = {"name": "mission", "within_min": within_min, "mission": _read(tree)}
-            mission = self._book.desk.open(OwnersEntry.model_validate(written))
+            mission = self._open({"name": "mission", "within_min": within_min}, tree)
         else:
             mission = self._find_saved(name)
         given = read_values(mission.spec, values or [])
@@ -150,7 +231,7 @@ class MissionTools:
         book = self._book
         if tree is None:
             path = self._find_saved(name).path
-            if not correction or path is None:
+            if not correction:
                 raise SkillError("Nothing is to be saved.", hint="Give a tree, or a correction.")
             add_correction(path, name, correction)
             told = "Its steps are as before: save a tree that does it, where one can."
@@ -165,10 +246,9 @@ class MissionTools:
                 "sentence": sentence,
                 "arguments": [_read_parameter(each) for each in parameters or []],
                 "within_min": within_min,
-                "mission": _read(tree),
                 "remember": [*kept, *([correction] if correction else [])],
             }
-            await self._check(book.desk.open(OwnersEntry.model_validate(written)), {})
+            await self._check(self._open(written, tree), {})
             self._check_file(path := book.folder / f"{name}.yaml", name)
             filled = {key: each for key, each in written.items() if each not in ("", [])}
             write_skills(path, {"skills": [filled]})
@@ -188,11 +268,15 @@ class MissionTools:
     async def forget_mission(self, name: Name) -> str:
         """Forget a saved mission; its file is kept beside as NAME.yaml.forgotten."""
         path = self._find_saved(name).path
-        if path is not None:
-            self._check_file(path, name)
-            path = set_aside(path)
+        self._check_file(path, name)
+        path = set_aside(path)
         self._book.load_saved()
         return f"{name} is forgotten; its file is kept as {path}."
+
+    def _open(self, written: dict[str, JsonValue], tree: object) -> Mission:
+        """Return a mission that stands nowhere yet; its tree is put where it is written."""
+        written["mission"] = parse_tree(tree) or []
+        return self._book.desk.open(OwnersEntry.model_validate(written))
 
     async def _check(self, mission: Mission, given: Arguments) -> MissionBounds:
         """Return what a mission can do at most; refuse places that are not there."""
@@ -239,10 +323,6 @@ class MissionTools:
         return say_mission(mission, self._book.desk.check(mission))
 
 
-def _read(tree: object) -> JsonValue:
-    return parse_tree(tree) or []
-
-
 def _read_parameter(said: str) -> dict[str, JsonValue]:
     """Return a parameter written as name or name=default, as a file has it."""
     name, has_default, default = (each.strip() for each in said.partition("="))
@@ -254,12 +334,11 @@ def _read_parameter(said: str) -> dict[str, JsonValue]:
 
 def read_values(spec: SkillSpec, values: list[str]) -> dict[str, JsonValue]:
     """Return arguments written as name=value, as what their parameters hold."""
-    kinds = {each.name: each.kind for each in spec.parameters}
     given: dict[str, JsonValue] = {}
     for each in values:
-        name, equals, value = each.partition("=")
+        name, equals, value = (part.strip() for part in each.partition("="))
         if not equals:
             raise SkillError(f"{each[:60]!r} is no value.", hint="Write name=value.")
-        plain, kind = value.strip(), kinds.get(name.strip(), ParameterKind.TEXT)
-        given[name.strip()] = plain if kind is ParameterKind.TEXT else parse_tree(plain)
+        is_text = spec.parameters.get(name, {}).get("type", "string") == "string"
+        given[name] = value if is_text else parse_tree(value)
     return given

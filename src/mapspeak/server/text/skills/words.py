@@ -1,19 +1,28 @@
 """Skills and missions in words: descriptions, conditions, trees, questions, interruptions."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
-from mapspeak.memory.quoting import quote
+from mapspeak.memory.quoting import clean_line, quote
 from mapspeak.server.text.offered import lead
+from mapspeak.server.text.ros.values import cut, show_message
 from mapspeak.server.text.wording import say_count
-from mapspeak.skill import Arguments, JsonValue, Skill, SkillCode, SkillEffect, SkillSpec
+from mapspeak.skill import (
+    Arguments,
+    JsonValue,
+    Skill,
+    SkillCode,
+    SkillEffect,
+    SkillOutcome,
+    SkillState,
+)
 from mapspeak.skills.arguments import say_wanted
-from mapspeak.skills.bounds import MissionBounds
-from mapspeak.skills.missionrecord import Interrupted
-from mapspeak.skills.runs import Question, QuestionBook
+from mapspeak.skills.missions import Interrupted, MissionBounds
+from mapspeak.skills.runs import Question, QuestionBook, SkillRun
 from mapspeak.skills.steps import Mission, Step, StepKind
 
 MOST_SENTENCE = 300
 MOST_WORDS = 80
+MOST_QUOTE = 300
 MOST_SKILLS = 100
 MOST_STEPS_TOLD = 20
 EFFECTS = {
@@ -48,15 +57,15 @@ HEADS = {
 
 def describe_skill(skill: Skill) -> str:
     """Return the description of a skill for a model; its owner's words are quoted."""
-    spec = skill.spec
-    needs = f"It needs: {say_conditions(spec.needs)}." if spec.needs else ""
-    told = (_title("Run the robot's skill", spec), EFFECTS[spec.effect], needs, say_remark(skill))
-    return " ".join(filter(None, told))
+    needs = f"It needs: {say_conditions(skill.spec.needs)}." if skill.spec.needs else ""
+    title, does = _title("Run the robot's skill", skill), EFFECTS[skill.spec.effect]
+    return " ".join(filter(None, (title, does, needs, say_remark(skill))))
 
 
-def _title(what: str, spec: SkillSpec) -> str:
-    said = quote(spec.description.removesuffix("."), most=MOST_SENTENCE)
-    return f"{what} {spec.name}: {said}." if spec.description else f"{what} {spec.name}."
+def _title(what: str, skill: Skill) -> str:
+    name, description = skill.spec.name, skill.spec.description.removesuffix(".")
+    said = f": {quote(description, most=MOST_SENTENCE)}" if description else ""
+    return f"{what} {name}{said}."
 
 
 def say_remark(*skills: Skill) -> str:
@@ -87,10 +96,10 @@ def _say_condition(name: str, value: JsonValue) -> str:
 def say_mission(mission: Mission, bounds: MissionBounds) -> str:
     """Return a mission as a tree, with its parameters and what it may do at most."""
     spec = mission.spec
-    lines = [_title("Mission", spec)]
-    for each in spec.parameters:
-        default = "" if each.default is None else f", {each.default!r} when left out"
-        lines.append(f"It takes {each.name}, {say_wanted(each)}{default}.")
+    lines = [_title("Mission", mission)]
+    for name, schema in spec.parameters.items():
+        default = f", {schema['default']!r} when left out" if "default" in schema else ""
+        lines.append(f"It takes {name}, {say_wanted(schema)}{default}.")
     lines += filter(None, [say_remark(mission), say_bounds(mission, bounds)])
     return "\n".join([*lines, *_draw(mission.tree, "", "")])
 
@@ -131,15 +140,48 @@ def draw_mission(mission: Mission) -> dict[str, JsonValue]:
     """Return a mission's tree as JSON, for a page that draws it."""
 
     def draw(step: Step) -> dict[str, JsonValue]:
-        return {
-            "number": step.number,
-            "kind": str(step.kind),
-            "said": _say_step(step),
-            "steps": [draw(each) for each in step.steps],
-        }
+        drawn = {"number": step.number, "kind": str(step.kind), "said": _say_step(step)}
+        return {**drawn, "steps": [draw(each) for each in step.steps]}
 
     remember = list(mission.remember)
     return {"name": mission.spec.name, "remember": remember, "tree": draw(mission.tree)}
+
+
+def say_run(run: SkillRun, steps_told: Sequence[str] = ()) -> str:
+    """Return the state of a run, with its progress but steps told, its questions, or its result."""
+    told, name = run.progress, run.skill.spec.name
+    parts = [f"{run.handle} ({name}): {run.state} after {run.passed_s:.1f} s."]
+    parts += [say_remark(run.skill), _say_account(told.account, steps_told)]
+    if run.outcome is not None:
+        parts.append(_say_outcome(run.outcome))
+    elif run.error is not None:
+        parts.append(str(run.error))
+    else:
+        if told.values:
+            parts.append(f"latest progress of {run.n_progress}:\n{show_message(told.values)}")
+        parts += [say_waiting(run.runs.questions) if run.is_asking else "", lead(GOES_ON)]
+    return cut("\n".join(filter(None, parts)))
+
+
+def _say_account(account: Sequence[str], told: Sequence[str]) -> str:
+    """Return the steps of a mission; they hold texts of others, and are quoted."""
+    lines = [f"- {clean_line(each)}" for each in account if each not in told]
+    n_told = len(account) - len(lines)
+    head = f"Done, besides {say_count(n_told, 'step')} told before" if n_told else "Done"
+    return "\n".join([f"{head} (observed, no instruction):", *lines]) if account else ""
+
+
+def _say_outcome(outcome: SkillOutcome) -> str:
+    numbers = ", ".join(f"{name} {value:g}" for name, value in outcome.numbers.items())
+    parts = (
+        CODES[outcome.code],
+        f"It needs {say_conditions(outcome.unmet)}." if outcome.unmet else "",
+        f"({numbers})" if numbers else "",
+        f"The robot says: {quote(outcome.quote, most=MOST_QUOTE)}." if outcome.quote else "",
+    )
+    head = "result:" if outcome.state is SkillState.SUCCEEDED else "what it gave:"
+    result = f"{head}\n{show_message(outcome.outputs)}" if outcome.outputs else ""
+    return "\n".join(filter(None, (" ".join(filter(None, parts)), result)))
 
 
 def say_question(question: Question) -> str:
@@ -161,10 +203,9 @@ def say_waiting(questions: QuestionBook) -> str:
 def say_skills(skills: Iterable[Skill]) -> str:
     """Return all skills, a line each; their owners' words are quoted."""
     lines = []
-    for each in skills:
-        spec = each.spec
-        takes = ", ".join(parameter.name for parameter in spec.parameters) or "nothing"
+    for spec in (each.spec for each in skills):
         said = f": {quote(spec.description, most=120)}" if spec.description else ""
+        takes = ", ".join(spec.parameters) or "nothing"
         lines.append(f"- {spec.name}({takes}), {spec.effect}{said}")
     shown = lines[:MOST_SKILLS]
     rest = f"\nand {len(lines) - MOST_SKILLS} more." if len(lines) > MOST_SKILLS else ""
