@@ -163,6 +163,19 @@ async def test_a_navigation_that_never_begins_times_out_and_is_stopped() -> None
     assert robot.n_stops == 1
 
 
+async def test_a_drive_tells_how_far_the_robot_has_come_on_it() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    there = await start(drives, FAR)
+    began = robot.pose.point
+    ended = await drives.wait(there.goal_id, wait_s=25.0, on_progress=tell_nobody)
+    assert ended.driven_m >= began.distance_to(FAR.point) - 0.2
+    back = await start(drives, Pose(began.x, began.y))
+    assert (await drives.report(back.goal_id)).driven_m == 0.0
+    await drives.wait(back.goal_id, wait_s=25.0, on_progress=tell_nobody)
+    assert (await drives.report(there.goal_id)).driven_m == ended.driven_m
+
+
 async def test_a_drive_that_goes_on_does_not_time_out() -> None:
     drives = DriveBook(FakeRobot(two_rooms()), patience_s=1.0)
     drive = await start(drives, FAR)

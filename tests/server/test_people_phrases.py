@@ -265,6 +265,38 @@ async def test_the_left_door_is_the_left_one_as_the_robot_sees_it(client: Client
     assert f"{left} is the left one" not in behind
 
 
+@pytest.mark.parametrize(
+    ("words", "x"),
+    [
+        ("the south door of {}", 3.6),
+        ("door in the southern wall of {}", 3.6),
+        ("the west door of {}", 1.9),
+        ("the door on the east side of {}", 8.4),
+        ("door east of {}", 8.4),
+    ],
+)
+async def test_a_door_is_meant_by_the_side_of_a_room_that_it_is_on(
+    client: Client, words: str, x: float
+) -> None:
+    corridor = (await _ways(client, ["largest corridor"]))[0]
+    goal = await _goal(client, words.format(corridor))
+    assert goal["pose"]["x"] == pytest.approx(x, abs=0.6)
+
+
+async def test_a_side_with_several_doors_or_none_is_told_with_the_ids_to_choose_from(
+    client: Client,
+) -> None:
+    corridor = (await _ways(client, ["largest corridor"]))[0]
+    doors = await _ways(client, [f"all doors of {corridor}"])
+    room = (await _sizes(client))[0]
+    several = text_of(await client.call_tool("check_goal", {"place": f"north door of {corridor}"}))
+    assert "3 doors in the north" in several
+    assert len(set(re.findall(r"D\d+", several)) & set(doors)) == 3
+    none = text_of(await client.call_tool("check_goal", {"place": f"the north door of {room}"}))
+    assert "no door in the north" in none
+    assert re.search(r"D\d", none)
+
+
 async def test_rooms_are_meant_by_how_many_doors_they_have(client: Client) -> None:
     assert sorted(await _ways(client, ["rooms with one door"])) == sorted(await _sizes(client))
     none = text_of(await client.call_tool("measure", {"places": ["rooms with two doors"]}))

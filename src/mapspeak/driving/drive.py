@@ -312,7 +312,13 @@ class DriveBook:
         # It may have been ended while it was sent.
         drive = self._drives.get(drive.goal_id, drive)
         drive = self._keep(
-            replace(drive, started_s=started_s, robot_goal_id=robot_goal_id, heard=JUST_SENT)
+            replace(
+                drive,
+                started_s=started_s,
+                begun_m=self.odometer.driven_m,
+                robot_goal_id=robot_goal_id,
+                heard=JUST_SENT,
+            )
         )
         if drive.final is not None:
             self._owed.owe(drive.goal_id)
@@ -381,7 +387,8 @@ class DriveBook:
         """Note how a drive ended; the first word counts."""
         drive = self._drives.get(drive.goal_id, drive)
         if drive.final is None:
-            self._keep(replace(drive, final=status, ended_s=self._robot.now_s))
+            ended_m = self.odometer.driven_m
+            self._keep(replace(drive, final=status, ended_s=self._robot.now_s, ended_m=ended_m))
 
     def _keep(self, drive: Drive) -> Drive:
         self._n_started += drive.goal_id not in self._drives

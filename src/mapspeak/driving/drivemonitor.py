@@ -231,6 +231,7 @@ class DriveMonitor:
             status = replace(drive.final, afterwards=status.afterwards)
         unseen_s = 0.0 if look.error is None else self._wall_s() - self._seen_s
         until_s = now_s if drive.ended_s is None else drive.ended_s
+        until_m = self.odometer.driven_m if drive.ended_m is None else drive.ended_m
         return DriveReport(
             drive=drive,
             status=status,
@@ -241,6 +242,7 @@ class DriveMonitor:
             is_stop_owed=is_stop_owed,
             # A simulation that is begun anew sets its clock back.
             elapsed_s=max(until_s - drive.started_s, 0.0),
+            driven_m=0.0 if drive.robot_goal_id is None else until_m - drive.begun_m,
         )
 
 

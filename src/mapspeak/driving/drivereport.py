@@ -30,8 +30,10 @@ class Drive:
         thing: The remembered thing that it goes to see; None for other goals.
         part_of: The drive that was asked for and that this one ends; None for one of its own.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
+        begun_m: What the odometer of the drives showed then.
         ended_s: Robot time when it was heard that the drive had ended; None while it goes on.
         ended_at: Where the robot was then; None where that is not known.
+        ended_m: What the odometer showed then; None while it goes on.
         heard: How it stood when the robot was heard last.
     """
 
@@ -46,8 +48,10 @@ class Drive:
     thing: RememberedThing | None = None
     part_of: "Drive | None" = None
     begun_at: Point | None = None
+    begun_m: float = 0.0
     ended_s: float | None = None
     ended_at: Point | None = None
+    ended_m: float | None = None
     heard: GoalStatus = JUST_SENT
     final: GoalStatus | None = None
 
@@ -63,6 +67,7 @@ class DriveReport:
         pose_doubt: Why the robot may be elsewhere; None for a fresh pose on the map.
         silence: What is missing of the robot, in words; empty where nothing is.
         is_stop_owed: It has to be stopped, and the robot could not be told so yet.
+        driven_m: How far the robot has come on it, by its own poses.
     """
 
     drive: Drive
@@ -73,6 +78,7 @@ class DriveReport:
     silence: str
     is_stop_owed: bool
     elapsed_s: float
+    driven_m: float
 
     @property
     def as_asked(self) -> "DriveReport":
@@ -86,10 +92,16 @@ class DriveReport:
             place=asked.place,
             purpose=asked.purpose,
             started_s=asked.started_s,
+            begun_m=asked.begun_m,
             part_of=asked.part_of,
         )
         before_s = drive.started_s - asked.started_s
-        return replace(self, drive=told, elapsed_s=self.elapsed_s + max(before_s, 0.0))
+        return replace(
+            self,
+            drive=told,
+            elapsed_s=self.elapsed_s + max(before_s, 0.0),
+            driven_m=self.driven_m + drive.begun_m - asked.begun_m,
+        )
 
 
 def find_drive(drives: Mapping[str, Drive], goal_id: str | None) -> Drive:

@@ -331,4 +331,5 @@ async def _turn_to_new_walls(
         drive=replace(drive, goal=faced),
         status=report.status,
         elapsed_s=report.elapsed_s + turned.elapsed_s,
+        driven_m=report.driven_m + turned.driven_m,
     )

@@ -8,16 +8,13 @@ import numpy as np
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
+from mapspeak.places.doorways import find_near_side, find_normal, other_side, point_before
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.grammar import Towards
 from mapspeak.places.relations.placement import find_reachable_cells, refuse, stand, tolerance_m
 from mapspeak.places.relations.referents import (
     ROBOT,
     Referent,
-    find_near_side,
-    find_normal,
-    other_side,
-    point_before,
     refer_to_door,
 )
 from mapspeak.places.relations.vocabulary import Compass, Side, read_heading

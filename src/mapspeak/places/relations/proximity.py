@@ -6,6 +6,7 @@ import numpy as np
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
+from mapspeak.places.doorways import find_normal, point_before
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.directions import front_of_region
 from mapspeak.places.relations.placement import (
@@ -19,8 +20,6 @@ from mapspeak.places.relations.placement import (
 from mapspeak.places.relations.referents import (
     ROBOT,
     Referent,
-    find_normal,
-    point_before,
     refer_to_door,
 )
 from mapspeak.places.standing import point_along, reach_doors

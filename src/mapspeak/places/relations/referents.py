@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 
 from mapspeak.errors import GoalError, NextStep
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import name_key
+from mapspeak.places.doorways import find_near_side, find_normal, offsets_around
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import (
     MOST_NAMED,
@@ -19,11 +20,18 @@ from mapspeak.places.naming import (
     find_named,
     say_spot,
 )
-from mapspeak.places.relations.grammar import Superlative, parse_relation
-from mapspeak.places.relations.outlines import find_sides
+from mapspeak.places.relations.grammar import COMPASS, Superlative, parse_relation
+from mapspeak.places.relations.outlines import SAME_SIDE_RAD, find_sides
 from mapspeak.places.relations.placement import refuse
-from mapspeak.places.relations.vocabulary import GAP, Side, pattern, plain, read_heading
-from mapspeak.places.standing import point_ahead
+from mapspeak.places.relations.vocabulary import (
+    GAP,
+    Compass,
+    Side,
+    pattern,
+    plain,
+    read_compass,
+    read_heading,
+)
 from mapspeak.places.things import find_place_ids, find_things, find_things_seen, list_pictures
 from mapspeak.places.ways import standing_point
 from mapspeak.spatial.frontiers import Frontier
@@ -33,8 +41,6 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 ROBOT = "the robot"
-AROUND_DOOR_M = 0.6
-"""Floor within this distance on both sides of a door tells which way it leads."""
 AROUND_THING_M = 1.5
 BOTH_SIDES_M = 0.2
 """A thing whose distances to two regions differ by less belongs to neither."""
@@ -129,65 +135,12 @@ def refer_to_point(
 
 def _find_region_around(world: WorldModel, point: Point) -> Region | None:
     """Find the region that a thing stands in; None for what is in a wall between two."""
-    offsets, labels = _offsets(world, world.rooms.labels, point, AROUND_THING_M)
+    offsets, labels = offsets_around(world, world.rooms.labels, point, AROUND_THING_M)
     if not labels.size:
         return None
     away_m = np.hypot(*offsets.T)
     indices = np.unique(labels[away_m <= away_m.min() + BOTH_SIDES_M])
     return next((each for each in world.rooms.regions if [each.index] == indices.tolist()), None)
-
-
-def find_normal(world: WorldModel, door: Door, side: Region) -> float:
-    """Return the direction in which a door leads into one of its two regions, as a yaw.
-
-    It is at right angles to the line through its two posts where the floor near it shows no other.
-    """
-    reach_m = door.width_m / 2 + AROUND_DOOR_M
-    offsets, labels = _offsets(world, world.rooms.labels, door.place, reach_m)
-    is_near = np.hypot(*offsets.T) <= reach_m
-    middles = []
-    for region in (side, other_side(world, door, side)):
-        near = offsets[is_near & (labels == region.index)]
-        middles.append(near.mean(axis=0) if len(near) else np.zeros(2))
-    into = middles[0] - middles[1]
-    return _squared(world, door, math.atan2(float(into[1]), float(into[0])))
-
-
-def _offsets(
-    world: WorldModel, values: np.ndarray, centre: Point, reach_m: float
-) -> tuple[FloatArray, np.ndarray]:
-    """Return where cells that are not 0 lie from a point, in metres, and their values."""
-    window = world.grid.window_around(centre, reach_m)
-    rows, cols = np.nonzero(values[window])
-    points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
-    return points - np.array([centre.x, centre.y]), values[window][rows, cols]
-
-
-def other_side(world: WorldModel, door: Door, side: Region) -> Region:
-    """Return the region beyond a door."""
-    return world.rooms.region(next(each for each in door.region_ids if each != side.id))
-
-
-def point_before(world: WorldModel, door: Door, side: Region) -> Point:
-    """Return the point before a door on one side, as far off as the robot is wide on one side."""
-    return point_ahead(door.place, find_normal(world, door, side), world.radius_m)
-
-
-def _squared(world: WorldModel, door: Door, rough_rad: float) -> float:
-    """Turn a direction through a door until the posts beside it lie square to it."""
-    reach_m = door.width_m / 2 + AROUND_DOOR_M
-    points, _ = _offsets(world, world.grid.occupied, door.place, reach_m)
-    across = np.array([-math.sin(rough_rad), math.cos(rough_rad)])
-    posts = []
-    for sign in (1.0, -1.0):
-        beside = points[(points @ (sign * across)) > 0.5 * np.hypot(*points.T)]
-        if not len(beside):
-            return rough_rad
-        posts.append(beside[int(np.argmin(np.hypot(*beside.T)))])
-    line = posts[0] - posts[1]
-    square_rad = math.atan2(float(line[1]), float(line[0])) - math.pi / 2
-    off_rad = math.remainder(square_rad - rough_rad, math.tau)
-    return math.remainder(square_rad, math.tau) if abs(off_rad) < math.pi / 4 else rough_rad
 
 
 def _refer_to_region(world: WorldModel, region: Region) -> Referent:
@@ -209,22 +162,6 @@ def refer_to_door(world: WorldModel, door: Door, near: Region, *, name: str = ""
     return Referent(name=name or door.id, anchor=door.place, extent=extent, home=near, door=door)
 
 
-def find_near_side(world: WorldModel, door: Door) -> Region:
-    """Return the region of a door on whose side the robot comes to it."""
-    sides = [world.rooms.region(region_id) for region_id in door.region_ids]
-    here = world.find_room_id(world.robot.point)
-    standing = next((side for side in sides if side.id == here), None)
-    if standing is not None:
-        return standing
-
-    def path_m(side: Region) -> float:
-        ahead_m = world.radius_m + AROUND_DOOR_M
-        found_m = world.path_m(point_ahead(door.place, find_normal(world, door, side), ahead_m))
-        return math.inf if found_m is None else found_m
-
-    return min(sides, key=path_m)
-
-
 ROOM = pattern(r"(?:(?P<here>this|current|same) )?(?P<noun>room|corridor|hallway|open space|area)")
 CLASSES = {
     "room": (RoomClass.ROOM, RoomClass.OPEN_SPACE),
@@ -232,10 +169,15 @@ CLASSES = {
     "hallway": (RoomClass.CORRIDOR,),
 }
 """What a word may be said of; other words of all."""
+TOWARDS = COMPASS.replace("compass", "towards")
 DOOR = pattern(
-    r"(?:(?P<side>left|right)(?: hand)? )?(?:door|doorway)"
-    r"(?: (?:between (?P<one>.+?) and (?P<other>.+)|(?:of|in|to) (?P<room>.+)))?"
+    rf"(?:(?P<side>left|right)(?: hand)? |{COMPASS}(?: side)? )?(?:door|doorway)"
+    r"(?: (?:between (?P<one>.+?) and (?P<other>.+)"
+    rf"|(?:(?:(?:on|in|at|to) )?(?:the )?{TOWARDS}(?: side| wall| end)? of|of|in|to)"
+    r" (?P<room>.+)))?"
 )
+OUTERMOST_M = 1.0
+"""So much farther on one side of a room than its other doors, a door is the one there."""
 OF_PLACE = pattern(r"(?P<label>.+?) (?:of|at|seen from|from) (?P<place>.+)")
 
 
@@ -364,6 +306,37 @@ def _choose_by_side(world: WorldModel, room: Region, doors: list[Door], side: Si
     return Place(door.id, door, f"{which} {sees}")
 
 
+def _choose_towards(world: WorldModel, room: Region, doors: list[Door], compass: Compass) -> Place:
+    """Return the door through which a room is left in a direction, else the outermost there.
+
+    The outermost of several counts where it is beyond the middle of the room.
+
+    Raises:
+        GoalError: There is none, or there are several.
+    """
+    towards_rad = compass.heading_rad
+
+    def leads_there(door: Door) -> bool:
+        off_rad = find_normal(world, door, room) + math.pi - towards_rad
+        return abs(wrap_angle(off_rad)) <= SAME_SIDE_RAD
+
+    def ahead_m(point: Point) -> float:
+        return point.x * math.cos(towards_rad) + point.y * math.sin(towards_rad)
+
+    found = [door for door in doors if leads_there(door)]
+    if not found and len(doors) > 1:
+        farthest_m = max(ahead_m(door.place) for door in doors)
+        least_m = max(ahead_m(find_sides(world, room)[1]), farthest_m - OUTERMOST_M)
+        found = [door for door in doors if ahead_m(door.place) >= least_m]
+    if len(found) == 1:
+        which = f"the {compass} one of the {len(doors)} doors of {room.id}"
+        return Place(found[0].id, found[0], which if len(doors) > 1 else "")
+    n_found = f"{len(found)} doors" if found else "no door"
+    ids = ", ".join(door.id for door in (found or doors)[:MOST_NAMED])
+    said = f"{room.id} has {n_found} in the {compass}."
+    raise GoalError(said, hint=f"Say which one by its id: {ids}.")
+
+
 def _find_only_door(world: WorldModel, wanted: str) -> Place | None:
     """Find "the door": the only one of the room that is named, or that the robot stands in."""
     match = DOOR.fullmatch(wanted)
@@ -377,6 +350,9 @@ def _find_only_door(world: WorldModel, wanted: str) -> Place | None:
     rooms = rooms or [find_room_here(world)]
     ids = {room.id for room in rooms}
     doors = [door for door in world.rooms.doors if ids <= set(door.region_ids)]
+    compass = read_compass(match["compass"] or match["towards"])
+    if compass is not None and len(rooms) == 1 and doors:
+        return _choose_towards(world, rooms[0], doors, compass)
     if len(doors) == 1:
         return Place(doors[0].id, doors[0])
     if match["side"] and len(rooms) == 1 and doors:

@@ -101,6 +101,7 @@ class DriveAnswer(Report):
     )
     distance_left_m: float | None = Field(description="by path; straight once it has ended")
     elapsed_s: float
+    driven_m: float = Field(description="by its own poses")
     reason: str
     next_step: str = Field(description="empty once the robot stands at the goal")
 
@@ -119,6 +120,7 @@ class DriveAnswer(Report):
             pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
+            driven_m=round(report.driven_m, 1),
             reason=say_end(
                 report.status,
                 report.drive.thing,
