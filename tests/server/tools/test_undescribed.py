@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from mcp.client import Client
 
+from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, make_guard
 from mapspeak.geometry import Pose
@@ -20,6 +21,18 @@ pytestmark = pytest.mark.anyio
 
 TOOLSETS = ("look", "places", "drive", "paper", "memory")
 SINK = Detection(label="sink", bearing_rad=0.2, range_m=1.5, confidence_ratio=0.9)
+CORRIDOR = grid_from_text(
+    """
+    ##########################################
+    #........................................#
+    #........................................#
+    #........................................#
+    #........................................#
+    #........................................#
+    ##########################################
+    """,
+    resolution_m=0.25,
+)
 VIEWS = (Pose(1.0, 1.4, 0.0), Pose(1.0, 1.4, 1.5), Pose(2.5, 1.4, 0.0))
 
 
@@ -80,7 +93,9 @@ async def test_one_call_describes_many_pictures_each_from_its_own_pose(tmp_path:
     assert [each.pose.point for each in places.waypoints] == [each.point for each in VIEWS]
     assert len({each.picture for each in places.waypoints}) == 3
     assert places.waypoints[1].functional_landmarks[0].bearing_from == "picture"
-    assert [each.partition(" ")[0] for each in answer["others"]] == ["W2", "W3"]
+    assert [each["id"] for each in answer["others"]] == ["W2", "W3"]
+    assert [each["seen_from"].rpartition(" ")[2] for each in answer["others"]] == ["R2", "R2"]
+    assert answer["n_places"] == 3
     assert left == ""
 
 
@@ -95,7 +110,46 @@ async def test_what_is_wrong_with_one_place_costs_no_other(tmp_path: Path) -> No
         answer = await write(client, name="door", picture="P1", more=more)
     places = SemanticMapStore(tmp_path / "semantic_map.yaml").read()
     assert [each.name for each in places.waypoints] == ["door", "bench"]
-    assert answer["others"][0].startswith('"nowhere" was not written: There is no picture')
+    nowhere, bench = answer["others"]
+    assert nowhere["refused"][0].startswith('"nowhere" was not written: There is no picture')
+    assert (nowhere["id"], bench["id"]) == ("", "W2")
+
+
+async def test_further_places_are_told_as_fully_as_the_first(tmp_path: Path) -> None:
+    robot = FakeRobot(CORRIDOR)
+    charger = {"label": "charger", "image_column_px": 30}
+    ends = Pose(1.0, 0.8, 0.0), Pose(9.0, 0.8, 0.0)
+    async with connect(robot, tmp_path, guard=guard(tmp_path)) as client:
+        await look(client, robot, *ends)
+        west = {"name": "west end", "picture": "P1", "functional_landmarks": [charger]}
+        await write(client, **west)
+        west = {**west, "picture": "P2", "description": "Seen again."}
+        alone = await write(client, name="middle", picture="P2", more=[west])
+        (moved,) = alone["others"]
+        back = await write(client, name="west end", x=1.0, y=0.8)
+    west_end = next(
+        each
+        for each in SemanticMapStore(tmp_path / "semantic_map.yaml").read().waypoints
+        if each.name == "west end"
+    )
+    assert "pose x 1.00, y 0.80, yaw 0 deg, 8.0 m away" in moved["replaced"]
+    assert [each.partition(" ")[0] for each in moved["things"]] == ["T1"]
+    (warning,) = moved["warnings"]
+    assert "moved 8.0 m: noted from C1 now, from C1 before" in warning
+    assert "write it again with x 1.00, y 0.80" in warning
+    assert west_end.pose.point == ends[0].point
+    assert "8.0 m away" in back["replaced"]
+
+
+@pytest.mark.parametrize(("to_x", "n_warnings"), [(3.5, 0), (4.5, 1)])
+async def test_a_place_that_moves_far_within_one_room_is_warned_of(
+    tmp_path: Path, to_x: float, n_warnings: int
+) -> None:
+    robot = FakeRobot(CORRIDOR)
+    async with connect(robot, tmp_path, guard=guard(tmp_path)) as client:
+        await write(client, name="west end", description="A charger.", x=1.0, y=0.8)
+        answer = await write(client, name="west end", description="A charger.", x=to_x, y=0.8)
+    assert len(answer["warnings"]) == n_warnings
 
 
 async def test_a_picture_of_an_earlier_run_is_described_by_its_observation(tmp_path: Path) -> None:

@@ -317,19 +317,17 @@ class MemoryAnswer(Report):
         )
 
 
-class WriteAnswer(Report):
-    """What was remembered, and what was not."""
+class PlaceWritten(Report):
+    """What was remembered of one place, and what was not."""
 
-    id: str = Field(description="takes you there with navigate_to")
+    id: str = Field(description="takes you there with navigate_to; empty where nothing was written")
     seen_from: str = Field(description="pose, and the room by id")
     is_new: bool
     replaced: str = Field(description="what was known of the place and reads otherwise now")
     landmarks: list[str] = Field(description="new, merged, kept or gone, and what changed")
     things: list[str] = Field(description="by id, where they are")
     refused: list[str] = Field(description="what stays out, and why")
-    n_places: int = Field(description="remembered in all")
     warnings: list[str]
-    others: list[str] = Field(description="what became of each of more")
 
     @classmethod
     def of(
@@ -351,16 +349,38 @@ class WriteAnswer(Report):
             landmarks=list(say_landmarks(merge)),
             things=[],
             refused=list(refused),
-            n_places=len(memory.waypoints),
             warnings=list(warnings),
-            others=[],
         )
 
-    def line(self, name: str) -> str:
-        """Say in short what became of one of several places that were written at once."""
-        parts = [f"{self.id} {quote_name(name)} from {self.seen_from}", *self.landmarks]
-        parts += [f"left out {each}" for each in self.refused]
-        return "; ".join([*parts, *self.warnings])
+    @classmethod
+    def of_refusal(cls, said: str) -> Self:
+        """Make the report of a place of which nothing was written."""
+        return cls(
+            id="",
+            seen_from="",
+            is_new=False,
+            replaced="",
+            landmarks=[],
+            things=[],
+            refused=[said],
+            warnings=[],
+        )
+
+
+class WriteAnswer(PlaceWritten):
+    """What was remembered of a place, and of further ones."""
+
+    n_places: int = Field(description="remembered in all")
+    others: list[PlaceWritten] = Field(description="those of more, in its order")
+
+    @classmethod
+    def of_all(cls, written: Sequence[PlaceWritten], *, n_places: int) -> Self:
+        """Make the report of places written at once; what all warn of is said once."""
+        first, *others = written
+        for n, each in enumerate(others):
+            news = [said for said in each.warnings if said not in first.warnings]
+            others[n] = each.model_copy(update={"warnings": news})
+        return cls(**first.model_dump(), n_places=n_places, others=others)
 
 
 def _is_called(place: RememberedPlace, name: str) -> bool:

@@ -158,8 +158,8 @@ def say_also_closed(world: WorldModel, event: Event, now: datetime) -> str:
 
 MOST_KEPT = 6
 MOVED_M = 0.05
-FAR_M = 5.0
-"""Looks at one place are taken from no farther apart."""
+FAR_M = 3.0
+"""Looks at one place are taken from no farther apart: a corridor of 35 m is one room, too."""
 TURNED_RAD = math.radians(2.0)
 """A pose that differs by less is the same pose, estimated again."""
 
@@ -202,13 +202,13 @@ def say_far(previous: Waypoint, now: Waypoint, *, rooms: Sequence[str | None]) -
         rooms: The rooms that the earlier and the later pose lie in, by id.
     """
     before, after = (room or "no room" for room in rooms)
-    away_m = previous.pose.point.distance_to(now.pose.point)
-    is_same_room = before == after and rooms[0] is not None
-    if is_same_room or (before == after and away_m <= FAR_M):
+    at, away_m = previous.pose, previous.pose.point.distance_to(now.pose.point)
+    if before == after and away_m <= FAR_M:
         return []
-    said = f"was noted from {after} now, from {before} before, {away_m:.1f} m away."
+    said = f"{quote_name(now.name)} moved {away_m:.1f} m: noted from {after} now, from {before}"
     advice = "If that is another place, write it under a name of its own."
-    return [f"{quote_name(now.name)} {said} {advice}"]
+    back = f"To leave it where it was, write it again with x {at.x:.2f}, y {at.y:.2f}."
+    return [f"{said} before. {advice} {back}"]
 
 
 def _say_change(reunion: Reunion) -> str:

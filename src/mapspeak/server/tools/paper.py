@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from mcp.server.mcpserver import Image
 from pydantic import Field, WithJsonSchema
@@ -12,14 +12,14 @@ from pydantic import Field, WithJsonSchema
 from mapspeak.driving.episodewriter import Keeping
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.memory import Landmark, Merge, TakenPicture, Waypoint, WriteReceipt, name_key
+from mapspeak.memory import Merge, TakenPicture, Waypoint, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.asking import find_speaking_places
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.things import find_gone, forget_thing
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.reports.mappicture import say_axes, say_plain
-from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
+from mapspeak.server.reports.robot import MemoryAnswer, PlaceWritten, WriteAnswer
 from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far
 from mapspeak.server.text.offered import say_error
@@ -80,6 +80,16 @@ FromRow = Annotated[int, Field(description="row", ge=0)]
 WaypointName = Annotated[str | None, Field(description="one; else all")]
 MOST_JOINED = 500
 """Of more places the things are not joined anew for the answer to a write: it would wait."""
+
+
+class Named(NamedTuple):
+    """What a write named: a place, and things of it by label."""
+
+    place: str
+    labels: tuple[str, ...]
+
+
+Written = tuple[PlaceWritten, Named]
 
 
 class PaperTools:
@@ -150,16 +160,19 @@ class PaperTools:
             functional_landmarks=functional_landmarks,
             geometric_features=geometric_features,
         )
-        answer = await self._write(first, gone=gone, x=x, y=y, yaw_deg=yaw_deg)
-        others = [await self._write_too(each) for each in more or ()]
-        return answer.model_copy(update={"others": others})
+        written = [await self._write(first, gone=gone, x=x, y=y, yaw_deg=yaw_deg)]
+        written += [await self._write_too(each) for each in more or ()]
+        places = await self._session.compute(self._session.memory.read)
+        told = await self._with_things(written)
+        return WriteAnswer.of_all(told, n_places=len(places.waypoints))
 
-    async def _write_too(self, place: PlaceInput) -> str:
+    async def _write_too(self, place: PlaceInput) -> Written:
         """Write a further place; what is wrong with one costs no other."""
         try:
-            return (await self._write(place)).line(place.name)
+            return await self._write(place)
         except MapspeakError as error:
-            return f"{quote_name(place.name)} was not written: {say_error(error)}"
+            said = f"{quote_name(place.name)} was not written: {say_error(error)}"
+            return PlaceWritten.of_refusal(said), Named(place.name, ())
 
     async def _write(
         self,
@@ -169,7 +182,7 @@ class PaperTools:
         x: float | None = None,
         y: float | None = None,
         yaw_deg: float | None = None,
-    ) -> WriteAnswer:
+    ) -> Written:
         safety_landmarks, functional_landmarks = place.safety_landmarks, place.functional_landmarks
         check_name(place.name)
         await self._session.meet_map()
@@ -205,9 +218,9 @@ class PaperTools:
         places = await session.compute(memory.read)
         told = filter(None, (*annotator.remarks, *far, unsure, kept.fault, moved))
         refused = annotator.refused
-        answer = WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
+        answer = PlaceWritten.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
         named = (*merge.new, *(each.after for each in merge.merged))
-        return await self._with_things(answer, receipt.waypoint.name, named)
+        return answer, Named(receipt.waypoint.name, tuple(each.label for each in named))
 
     @tool("Recall remembered places", ToolEffect.READS, has_report=True)
     async def get_semantic_data(
@@ -316,19 +329,23 @@ class PaperTools:
         keep, name_map = self._session.episodes.keep_record, self._session.memory.name_map
         return await self._session.compute(partial(keep, waypoint, name_map=name_map))
 
-    async def _with_things(
-        self, answer: WriteAnswer, name: str, named: Sequence[Landmark]
-    ) -> WriteAnswer:
+    async def _with_things(self, written: Sequence[Written]) -> list[PlaceWritten]:
         """Add where the things are that were named, where a map is and that is soon told."""
+        answers = [answer for answer, _ in written]
         try:
             world = await self._session.fetch_world_model()
         except (LinkError, MapError):
-            return answer
+            return answers
         if len(world.places) > MOST_JOINED:
-            return answer
-        labels = [each.label for each in named]
-        things = await self._session.compute(partial(say_placed, world, name, labels))
-        return answer.model_copy(update={"things": things})
+            return answers
+
+        def add() -> list[PlaceWritten]:
+            return [
+                answer.model_copy(update={"things": say_placed(world, *named)})
+                for answer, named in written
+            ]
+
+        return await self._session.compute(add)
 
     async def _find_room_id(self, pose: Pose) -> str | None:
         try:
