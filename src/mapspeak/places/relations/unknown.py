@@ -89,12 +89,12 @@ def _find_like(wanted: str, ids: Sequence[str]) -> str | None:
 
 
 def _guess(world: WorldModel, wanted: str) -> tuple[RecallCandidate, ...]:
-    """Return what may be meant, as it is recalled, with its way; by a bare noun no mere likeness.
+    """Return what is meant by what is remembered, with its way; by a bare noun no mere likeness.
 
-    A "kitchen" is no thing that is only like it.
+    A "kitchen" is no thing that is only like it. What shares a word alone is named by no refusal.
     """
     recalled = recall(world, RecallQuery(words=wanted, n=MOST_GUESSES))
-    if recalled.answer.verdict is Verdict.NOT_REMEMBERED:
+    if recalled.verdict in (Verdict.NOT_REMEMBERED, Verdict.UNSURE):
         return ()
     is_bare = len(ARTICLE.sub("", wanted, count=1).split()) == 1
     return tuple(
