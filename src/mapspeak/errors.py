@@ -36,6 +36,7 @@ class NextStep(StrEnum):
     BEGIN_ROUTE = "begin_route"
     ALIGN = "align"
     END_EVENT = "end_event"
+    TAKE_SEVERAL = "take_several"
 
 
 def say_cause(error: Exception) -> str:

@@ -243,7 +243,9 @@ async def test_a_phrase_goes_into_every_tool_that_takes_a_place_and_comes_with_i
 async def test_a_thing_found_by_a_phrase_drives_under_its_own_id(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
         answer = report_of(await client.call_tool("navigate_to", {"place": "the nearest door"}))
-    assert answer["place"] == "D1"
+        asked = report_of(await client.call_tool("wait_for_goal", {}))
+    assert answer["place"].startswith("D1: the nearest door, ")
+    assert asked["place"] == "D1"
 
 
 async def test_an_ambiguous_phrase_is_answered_with_the_candidates(tmp_path: Path) -> None:

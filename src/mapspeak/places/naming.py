@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap, Waypoint, name_key
 from mapspeak.places.goalcheck import FARTHEST_M
@@ -87,8 +87,16 @@ class AmbiguousPlaceError(GoalError):
         meanings: Words for each of the things that mean it alone.
     """
 
-    def __init__(self, message: str, *, hint: str, words: str, meanings: Sequence[str]) -> None:
-        super().__init__(message, hint=hint)
+    def __init__(
+        self,
+        message: str,
+        *,
+        hint: str,
+        words: str,
+        meanings: Sequence[str],
+        step: NextStep | None = None,
+    ) -> None:
+        super().__init__(message, hint=hint, step=step)
         self.words = words
         self.meanings = tuple(meanings)
 

@@ -208,7 +208,7 @@ class RouteBook:
             pose, check = await self._site.compute(lambda: _check(world, goal))
             if not check.is_ok:
                 return check
-            drive = await drives.start(pose, place=goal.title, ticket=ticket, thing=goal.thing)
+            drive = await drives.start(pose, place=goal.name, ticket=ticket, thing=goal.thing)
         self._goal_id = drive.goal_id
         return None
 

@@ -128,9 +128,10 @@ class CheckedGoal:
 
     @property
     def title(self) -> str:
-        """What the drive there is called: the id of what has one, else the name with its reason."""
+        """What it is called, with how words for it were read: "R3: the largest room"."""
         reason = self.place.reason
-        is_told = reason and not is_taken_name(self.name)
+        is_named = is_taken_name(self.name) and not isinstance(self.place.thing, Region | Door)
+        is_told = reason and not is_named
         return f"{self.name}: {reason}" if is_told else self.name
 
     @property

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapspeak.errors import NextStep
+from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import judge_goal, say_check
 from mapspeak.places.naming import MOST_NAMED, AmbiguousPlaceError, Place
 from mapspeak.places.relations.grammar import Several, Superlative
@@ -23,6 +25,8 @@ from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 Ordered = Region | Door | Frontier | RememberedPlace | RememberedThing
 Words = Superlative | Several
+
+MOST_NAMED_IN = 2
 
 CLASSES = {
     Kind.CORRIDOR: (RoomClass.CORRIDOR,),
@@ -117,9 +121,10 @@ def require_one(words: str, found: Sequence[Place]) -> Place:
     shown = " ".join(ids[:MOST_NAMED]) + (" ..." if len(ids) > MOST_NAMED else "")
     raise AmbiguousPlaceError(
         f"{words[:80]!r} means {len(found)} places, and here one is wanted.",
-        hint=f"They are {shown}. Give the id of one.",
+        hint=f"They are {shown}. Give the id of one",
         words=words,
         meanings=ids,
+        step=NextStep.TAKE_SEVERAL,
     )
 
 
@@ -327,12 +332,32 @@ def _say_size(
         said += ", not all seen"
     if isinstance(thing, Region) and _is_unsure(world, thing):
         said += ", unsure"
-    for each in ranked:
-        most_m2 = each.value + world.growth_m2.get(each.thing.id, 0.0)
-        if isinstance(each.thing, Region) and each.value < found.value <= most_m2:
-            said += f"; {each.thing.id} ({each.value:.1f} m2) is not all seen and may be larger"
+    if isinstance(thing, Region) and (holds := _say_remembered_in(world, thing)):
+        said += f", with {holds}"
+    larger = [each for each in ranked if _may_be_larger(world, each, found)]
+    for each in larger:
+        said += f"; {each.thing.id} ({each.value:.1f} m2) is not all seen and may be larger"
+    for behind in ranked[ranked.index(found) + 1 :][:1]:
+        if behind not in larger:
+            said += f"; then {behind.thing.id}, {behind.value:.{digits}f} {unit}"
     left = ", ".join(f"{each.thing.id} ({each.value:.{digits}f} {unit})" for each in unsure)
     return f"{said}; unsure ones are left out: {left}" if left else said
+
+
+def _may_be_larger(world: WorldModel, one: Ranked, found: Ranked) -> bool:
+    """Return True for a region that is smaller than another as far as it has been seen."""
+    most_m2 = one.value + world.growth_m2.get(one.thing.id, 0.0)
+    return isinstance(one.thing, Region) and one.value < found.value <= most_m2
+
+
+def _say_remembered_in(world: WorldModel, region: Region) -> str:
+    """Name the first places that were remembered in a region; nothing for none."""
+    named = [
+        f"{each.id} {quote_name(each.waypoint.name)}"
+        for each in world.places
+        if world.find_room_id(each.waypoint.pose.point) == region.id
+    ]
+    return " and ".join(named[:MOST_NAMED_IN])
 
 
 def _say_way(world: WorldModel, found: Ranked, start: Referent | None) -> str:

@@ -59,6 +59,9 @@ def _fill(sentence: str, details: dict[str, object]) -> str:
     return sentence.format_map({**{name: name for name in tools}, **details})
 
 
+VISITS_ALL = "follow_route", "routes"
+"""The tool that takes several places as its goal, and its toolset."""
+
 STEPS = {
     NextStep.CHOOSE_ON_MAP: "{hint}. Call {look_at_map} and choose another one.",
     NextStep.DRIVE_THERE: (
@@ -81,6 +84,7 @@ STEPS = {
     NextStep.END_EVENT: (
         "{hint}. {end_event} ends an event that is over. {look_at_map} shows other places."
     ),
+    NextStep.TAKE_SEVERAL: "{hint}. {follow_route} visits them all. {measure} compares them all.",
     NextStep.ALIGN: "{hint}. {realign_memory} finds out how the maps lie.",
 }
 """What is said in place of a hint in plain words, with or without it."""
@@ -95,7 +99,11 @@ def say_hint(error: MapspeakError) -> str:
     """Say what to do next, by the tools there are."""
     if error.step is None:
         return error.hint
-    return lead(STEPS[error.step], hint=error.hint.removesuffix("."), about=error.about)
+    said = lead(STEPS[error.step], hint=error.hint.removesuffix("."), about=error.about)
+    offered, (name, toolset) = _OFFERED.get(), VISITS_ALL
+    if error.step is NextStep.TAKE_SEVERAL and offered is not None and name not in offered:
+        return f"{said} To visit all: {say_not_offered(name, [toolset])}"
+    return said
 
 
 def explain(name: str, cause: BaseException | None) -> str | None:

@@ -116,15 +116,17 @@ class DriveTools:
                 place=place, x=x, y=y, yaw_deg=yaw_deg, as_near=as_near
             )
             goal = await aim(self._session, goal)
-            with _scope_of(goal.title, goal.purpose):
+            with _scope_of(goal.name, goal.purpose):
                 drive = await drives.start(
                     goal.pose,
-                    place=goal.title,
+                    place=goal.name,
                     ticket=ticket,
                     purpose=goal.purpose,
                     thing=goal.thing,
                 )
-        return await self._wait(context, drive.goal_id, wait_s)
+        answer = await self._wait(context, drive.goal_id, wait_s)
+        # How the words were read is said once; what asks for the drive later gets its short name.
+        return answer.model_copy(update={"place": goal.title})
 
     @tool(
         "Wait for a drive",
@@ -305,7 +307,7 @@ async def drive_to_view(
         goal = await session.compute(lambda: choose_view(world, place, half_view_rad))
         if is_there(world.robot, goal.pose):
             return world, goal, None
-        title = f"a view of {goal.title}"
+        title = f"a view of {goal.name}"
         return world, goal, await session.drives.start(goal.pose, place=title, ticket=ticket)
 
 

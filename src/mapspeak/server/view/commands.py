@@ -194,7 +194,7 @@ class PersonCommands:
         self._feed.people.add(self._client)
         with session.client_is_heard(), session.drives.preparing() as ticket:
             goal = await session.find_goal(place=None, x=target.x, y=target.y, yaw_deg=None)
-            drive = await session.drives.start(goal.pose, place=goal.title, ticket=ticket)
+            drive = await session.drives.start(goal.pose, place=goal.name, ticket=ticket)
         return f"{drive.goal_id} to {drive.place} has begun."
 
     # --- the memory ------------------------------------------------------------------------------

@@ -188,7 +188,7 @@ class Leaves:
         with session.drives.preparing() as ticket:
             goal = await session.find_goal(place=given["place"], yaw_deg=given.get("yaw_deg"))
             drive = await session.drives.start(
-                goal.pose, place=goal.title, ticket=ticket, thing=goal.thing
+                goal.pose, place=goal.name, ticket=ticket, thing=goal.thing
             )
             outcome = await self._follow(drive, on_progress)
         if goal.thing is None or outcome.state is not SkillState.SUCCEEDED:
