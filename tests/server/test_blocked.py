@@ -3,6 +3,7 @@
 from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcp.client import Client
 
@@ -37,6 +38,18 @@ async def _blocked(client: Client) -> str:
 async def test_where_nothing_is_in_the_way_it_is_said(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
         assert (await _blocked(client)).startswith("Nothing is known to be blocked")
+
+
+async def test_a_border_with_too_little_to_see_is_not_told(tmp_path: Path) -> None:
+    cells = np.zeros((100, 100), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = cells[40:60, 80] = 100
+    cells[40:60, 81:87] = -1
+    robot = FakeRobot(OccupancyGrid(cells=cells, resolution_m=0.05))
+    async with connect(robot, tmp_path, toolsets=(*TOOLSETS, "look")) as client:
+        seen = text_of(await client.call_tool("look_at_map", {}))
+        text = await _blocked(client)
+    assert "with little to see" in seen
+    assert "not offered" not in text
 
 
 async def test_a_closure_is_told_with_its_end_and_with_what_it_cuts_off(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ async def test_a_room_is_meant_by_its_size(client: Client, words: str, at: int) 
 async def test_the_answer_says_why_it_is_that_room(client: Client) -> None:
     smallest = (await _sizes(client))[0]
     text = text_of(await client.call_tool("measure", {"places": ["smallest room"]}))
-    assert re.search(rf"{smallest} is the smallest of 4 rooms, \d+\.\d m2\.", text)
+    assert re.search(rf"{smallest} is the smallest of 4 rooms, \d+\.\d m2; then R\d, ", text)
 
 
 async def test_a_rank_that_there_is_not_names_those_there_are(client: Client) -> None:
@@ -165,6 +165,71 @@ async def test_where_one_place_is_wanted_several_are_named(client: Client) -> No
     assert answer.is_error
     assert "means 4 places" in text_of(answer)
     assert all(room in text_of(answer) for room in await _sizes(client))
+    assert text_of(answer).endswith(" follow_route visits them all. measure compares them all.")
+
+
+async def test_the_toolset_of_what_visits_several_is_named_where_it_is_not_offered(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(_four_rooms(), pose=Pose(1.5, 4.5))
+    async with connect(robot, tmp_path, toolsets=("drive",)) as client:
+        answer = text_of(await client.call_tool("navigate_to", {"place": "all rooms"}))
+    assert "To visit all: follow_route is not offered here." in answer
+    assert "--toolsets +routes" in answer
+
+
+async def test_a_drive_to_a_room_by_its_size_tells_it_with_its_name_and_the_next(
+    client: Client,
+) -> None:
+    smallest, second, *_ = await _sizes(client)
+    middle = (await _goal(client, smallest))["pose"]
+    shop = {"name": "shop", "description": "", "x": middle["x"], "y": middle["y"]}
+    await client.call_tool("write_semantic_data", shop)
+    driven = report_of(await client.call_tool("navigate_to", {"place": "smallest room"}))
+    asked = report_of(await client.call_tool("wait_for_goal", {}))
+    size = r"\d+\.\d m2"
+    said = f'{smallest}: the smallest of 4 rooms, {size}, with W1 "shop"; then {second}, {size}'
+    assert re.fullmatch(said, driven["place"])
+    assert asked["place"] == smallest
+
+
+async def test_how_a_phrase_was_read_is_said_by_the_drive_and_not_again(client: Client) -> None:
+    words = "between the two nearest doors"
+    driven = report_of(await client.call_tool("navigate_to", {"place": words}))
+    asked = report_of(await client.call_tool("wait_for_goal", {}))
+    assert driven["place"].startswith(f"{words}: between D")
+    assert asked["place"] == words
+
+
+@pytest.mark.parametrize("words", ["shortest tour of all rooms", "eastern half of C1"])
+async def test_what_shares_a_word_alone_is_not_offered_where_words_cannot_be_read(
+    client: Client, words: str
+) -> None:
+    labels = ("fire extinguisher", "second copier", "meeting table")
+    seen = [{"label": each, "bearing_deg": 90, "range_m": 0.6} for each in labels]
+    hall = {"name": "hall", "description": "The eastern half of the hall, with copiers."}
+    await client.call_tool("write_semantic_data", {**hall, "functional_landmarks": seen})
+    found = report_of(await client.call_tool("find_place", {"query": words}))
+    text = text_of(await client.call_tool("measure", {"places": [words]}))
+    assert found["verdict"] not in ("found", "likely", "several")
+    assert "is meant, use" not in text
+    assert "Such words can be read: " in text
+
+
+async def test_several_of_a_name_are_told_apart_by_what_each_is_called(client: Client) -> None:
+    for label, x in (("extinguisher 1", 2.0), ("extinguisher 2", 9.0)):
+        thing = {"label": label, "bearing_deg": 90, "range_m": 0.6}
+        place = {
+            "name": label,
+            "description": "",
+            "functional_landmarks": [thing],
+            "x": x,
+            "y": 4.5,
+        }
+        await client.call_tool("write_semantic_data", place)
+    text = text_of(await client.call_tool("navigate_to", {"place": "extinguisher"}))
+    assert 'T1 "extinguisher 1" in ' in text
+    assert 'T2 "extinguisher 2" in ' in text
 
 
 async def test_a_route_past_all_rooms_goes_to_the_nearest_next(client: Client) -> None:

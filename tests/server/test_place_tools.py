@@ -210,3 +210,16 @@ async def test_a_stop_says_which_drive_it_ended(tmp_path: Path) -> None:
         driving = text_of(await client.call_tool("stop_robot", {}))
     assert idle == "The robot was told to stop, and to give up every goal, whoever sent it."
     assert "G1 was ended" in driving
+
+
+async def test_of_where_the_robot_stands_no_way_is_told_and_what_lies_in_another_room_as_such(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("places", "paper")) as client:
+        for name, x in (("nook", 1.0), ("beyond", 4.5)):
+            place = {"name": name, "description": "A spot.", "x": x, "y": 1.4}
+            await client.call_tool("write_semantic_data", place)
+        text = text_of(await client.call_tool("describe_place", {"place": "robot"}))
+    assert "Remembered within 5 m: W1 at 0.5 m, W2 in R1 at 3.0 m." in text
+    assert "To go there" not in text
+    assert "it stands there" not in text

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import MemoryStore
-from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.quoting import name_key, quote_name
 from mapspeak.memory.store.forgetting import Forgotten, forget_place, forget_views, view_of
 from mapspeak.memory.things.labels import names_no_less
 from mapspeak.places.naming import (
@@ -168,13 +168,15 @@ def split_room(world: WorldModel, words: str) -> tuple[str, str | None]:
 def say_candidates(world: WorldModel, called: Sequence[RememberedThing]) -> str:
     """Say where some things are, how far, and how far by path to where each is seen."""
     told = []
+    is_alike = len({name_key(each.thing.label) for each in called}) == 1
     for each in called[:MOST_NAMED]:
         rooms = " or ".join(world.rooms_before(each)) or "no room"
         path_m = world.path_m(stand_before(world, each).point)
         at = each.thing.position
         off = "" if at is None else f"{world.robot.point.distance_to(at):.1f} m off, "
         way = "no way" if path_m is None else f"{path_m:.1f} m by path"
-        told.append(f"{each.id} in {rooms}, {off}{way}")
+        named = "" if is_alike else f" {quote_name(each.thing.label)}"
+        told.append(f"{each.id}{named} in {rooms}, {off}{way}")
     n_more = len(called) - len(told)
     return ", ".join(told) + (f" and {n_more} more" if n_more else "")
 

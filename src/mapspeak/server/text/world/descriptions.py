@@ -8,7 +8,7 @@ from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
 from mapspeak.places.candidate import SURE_RATIO, describe_candidate
 from mapspeak.places.goalcheck import is_in_obstacle, say_check
-from mapspeak.places.naming import Place
+from mapspeak.places.naming import ROBOT_NAMES, Place
 from mapspeak.places.recall.reported import count_in_region
 from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.relations.viewpoints import Sight, find_sights, measure_shown
@@ -31,6 +31,7 @@ from mapspeak.server.text.world.notices import (
     say_check_of_thing,
     say_direction,
     say_fit,
+    say_near,
     say_off,
 )
 from mapspeak.server.text.world.tables import list_sure_rooms, say_walk
@@ -162,10 +163,6 @@ def _quote_all(texts: Sequence[str]) -> str:
     return ", ".join(map(quote, texts))
 
 
-NEAR_M = 5.0
-MOST_NEAR = 6
-
-
 def describe_place(
     world: WorldModel, place: Place, *, picture_ids: Mapping[str, str], noted: Sequence[str] = ()
 ) -> str:
@@ -191,6 +188,8 @@ def describe_place(
 
 
 def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[str]:
+    if place.name in ROBOT_NAMES and goal.check.is_ok:
+        return
     at, is_thing = find_own_point(world, place), isinstance(place.thing, RememberedThing)
     off = ", where it was seen from" if is_thing else ""
     if at is not None:
@@ -324,17 +323,11 @@ def _say_remembered(remembered: RememberedPlace) -> str:
 def _spot_lines(world: WorldModel, place: Place) -> Iterator[str]:
     point = place.point
     yield f"{place.name} is at {say_point(point)}: {_say_ground(world, place)}."
-    places = ((each.waypoint.pose.point, each.id) for each in world.places)
-    things = (
-        (each.thing.position, f"{each.id} {quote(each.thing.label)}") for each in world.things
-    )
-    away = ((point.distance_to(at), name) for at, name in (*things, *places) if at is not None)
-    near = [f"{name} at {away_m:.1f} m" for away_m, name in sorted(away) if away_m <= NEAR_M]
     doors = sorted(world.rooms.doors, key=lambda door: point.distance_to(door.place))
     if doors:
         yield f"Nearest door: {doors[0].id}, {point.distance_to(doors[0].place):.1f} m off."
-    if near:
-        yield f"Remembered within {NEAR_M:.0f} m: {list_some(near, most=MOST_NEAR)}."
+    if near := say_near(world, point):
+        yield near
 
 
 def _say_ground(world: WorldModel, place: Place) -> str:

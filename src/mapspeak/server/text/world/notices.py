@@ -1,19 +1,22 @@
 """What is to be said of a world model before its rows: warnings, closures, where things lie."""
 
 import math
+from collections.abc import Iterator
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import SemanticMap
 from mapspeak.memory.events import tell_place
+from mapspeak.memory.quoting import quote
+from mapspeak.places.candidate import find_rooms_of
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.viewpoints import is_missed_from_near
 from mapspeak.places.standing import find_standing_point
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import say_count, say_pose_doubt, shorten
+from mapspeak.server.text.wording import list_some, say_count, say_pose_doubt, shorten
 from mapspeak.spatial.rooms import Door
 from mapspeak.worldmodel.keepout import ClosedArea, ClosedFloor
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedThing
+from mapspeak.worldmodel.remembered import Remembered, RememberedThing
 
 ASSUMED_RADIUS = (
     "The robot does not tell its size. A radius of {:.2f} m is assumed: doors and goals may be too "
@@ -93,6 +96,10 @@ def say_off(robot: Point, remembered: RememberedThing | None) -> str:
     return f"{remembered.id} is {robot.distance_to(position):.1f} m from the robot"
 
 
+NEAR_M = 5.0
+MOST_NEAR = 6
+
+
 def say_direction(world: WorldModel, point: Point) -> str:
     """Return where a point is as seen from the robot: "3.2 m straight, to its left"."""
     away_m = world.robot.point.distance_to(point)
@@ -101,6 +108,26 @@ def say_direction(world: WorldModel, point: Point) -> str:
     turn_rad = wrap_angle(world.robot.point.bearing_to(point) - world.robot.yaw_rad)
     eighth = round(turn_rad / (math.tau / 8)) % 8
     return f"{away_m:.1f} m straight, {DIRECTIONS[eighth]}"
+
+
+def say_near(world: WorldModel, point: Point) -> str:
+    """Say what is remembered near a point, with its room where that is another."""
+    near = [f"{name} at {away_m:.1f} m" for away_m, name in sorted(_list_near(world, point))]
+    return f"Remembered within {NEAR_M:.0f} m: {list_some(near, most=MOST_NEAR)}." if near else ""
+
+
+def _list_near(world: WorldModel, point: Point) -> Iterator[tuple[float, str]]:
+    own_id = world.find_room_id(point)
+    remembered: tuple[Remembered, ...] = (*world.things, *world.places)
+    for each in remembered:
+        if isinstance(each, RememberedThing):
+            at, name = each.thing.position, f"{each.id} {quote(each.thing.label)}"
+        else:
+            at, name = each.waypoint.pose.point, each.id
+        if at is not None and (away_m := point.distance_to(at)) <= NEAR_M:
+            room_ids = find_rooms_of(world, each)
+            is_here = not room_ids or own_id in room_ids
+            yield away_m, name if is_here else f"{name} in {' or '.join(room_ids)}"
 
 
 def say_explored(world: WorldModel) -> str:

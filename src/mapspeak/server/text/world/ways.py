@@ -22,6 +22,7 @@ from mapspeak.server.text.world.drives import say_end
 from mapspeak.server.text.world.maps import say_refusal
 from mapspeak.server.text.world.notices import say_obstruction, say_warnings
 from mapspeak.server.text.world.tables import say_floor, say_sizes
+from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedThing
@@ -68,7 +69,7 @@ def describe_blocked(
     known = {what: lines for what, lines in parts.items() if lines}
     counts = {what: len(lines) for what, lines in known.items()}
     if BORDERS in counts:
-        counts[BORDERS] = len(find_refused(world))
+        counts[BORDERS] = len(_find_borders(world))
     lines = list(_say_doubts(world, events, now))
     lines += [f"The robot is held, so it drives nowhere: {shorten(held_by)}."] if held_by else []
     lines.append(_say_in_the_way(counts))
@@ -135,12 +136,18 @@ def _why_no_way(world: WorldModel, place: Place) -> str:
 
 def _say_borders(world: WorldModel) -> Iterator[str]:
     """Say where the map ends without being offered, a line for each reason."""
-    by_reason = sorted(find_refused(world), key=say_refusal)
+    by_reason = sorted(_find_borders(world), key=say_refusal)
     for why, group in groupby(by_reason, key=say_refusal):
         borders = [f"{each.length_m:.1f} m at {say_point(each.anchor)}" for each in group]
         shown = "; ".join(borders[:MOST_LINES])
         n_more = len(borders) - MOST_LINES
         yield f"{why}: {shown}{f'; {n_more} more' if n_more > 0 else ''}."
+
+
+def _find_borders(world: WorldModel) -> list[RefusedFrontier]:
+    """Return the borders that something keeps the robot from; too little to see does not."""
+    refused = find_refused(world)
+    return [each for each in refused if each.reason is not RefusalReason.NOTHING_TO_SEE]
 
 
 def _is_open(world: WorldModel, drive: Drive) -> bool:
