@@ -11,7 +11,7 @@ from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
-from mapspeak.places.asking import RecallQuery, recall
+from mapspeak.places.asking import RecallQuery, leave_out_beside, recall
 from mapspeak.places.candidate import RecallDoubt
 from mapspeak.places.naming import AmbiguousPlaceError
 from mapspeak.places.relations.choosing import check_place, find_place
@@ -250,25 +250,73 @@ def test_a_thing_without_a_position_falls_back_to_where_it_was_seen_from() -> No
     assert "the goal is where it was seen from; seen from W1" in place.reason
 
 
+CHARGER = look("charging end", 1.0, 1.0, ("charging station", LADDER))
+
+
+def test_a_place_that_saw_the_thing_that_is_meant_is_no_rival_of_it() -> None:
+    answer = recall(world_of(CHARGER), RecallQuery(words="place to charge"))
+    assert answer.verdict in (Verdict.FOUND, Verdict.LIKELY)
+    assert answer.candidates[0].id == "T1"
+    assert answer.answer.n_meant == 1
+
+
+def test_what_only_stands_in_a_place_that_says_a_word_is_left_out_beside_what_is_called_by_it() -> (
+    None
+):
+    kitchen = replace(
+        look("kitchen", 2.0, 1.0, ("fridge", LADDER), ("fire hose", EXTINGUISHER)),
+        description="A fire blanket hangs here.",
+    )
+    world = world_of(*LOOKS, kitchen)
+    answer = leave_out_beside(recall(world, RecallQuery(words="fire", n=20)))
+    assert {each.name for each in answer.candidates} == {"fire extinguisher", "fire hose"}
+
+
+@pytest.mark.parametrize("words", ["everything seen", "last ten minutes"])
+def test_one_word_of_what_a_kind_is_used_for_makes_no_request_sound_like_it(words: str) -> None:
+    answer = recall(world_of(*looks_at("meeting table", EXTINGUISHER)), RecallQuery(words=words))
+    assert answer.verdict is Verdict.NOT_REMEMBERED
+    assert answer.answer.missing is None
+
+
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [("a piano", "piano"), ("where is the vest", "high-visibility vest")],
+)
+def test_a_kind_that_is_not_remembered_is_named_where_its_name_is_said(
+    words: str, kind: str
+) -> None:
+    assert recall(world_of(*LOOKS), RecallQuery(words=words)).answer.missing == kind
+
+
 def test_what_is_like_the_words_but_not_called_so_is_named_to_be_confirmed() -> None:
+    world = world_of(*looks_at("washbasin", EXTINGUISHER))
+    with pytest.raises(GoalError, match=r"nearest in words: T1 \"washbasin\".*use T1"):
+        find_place(world, "where can I wash my hands")
+
+
+def test_what_only_shares_a_word_with_the_words_is_not_named() -> None:
     world = world_of(*looks_at("wall box", EXTINGUISHER))
-    with pytest.raises(GoalError, match=r"nearest in words: T1 \"wall box\".*use T1"):
+    assert recall(world, RecallQuery(words="box of matches")).verdict is Verdict.UNSURE
+    with pytest.raises(GoalError) as caught:
         find_place(world, "box of matches")
+    assert "T1" not in str(caught.value)
 
 
 def test_of_things_as_like_the_words_the_nearest_is_named_first() -> None:
-    far = looks_at("fire extinguisher", EXTINGUISHER)
+    words = "where can I wash my hands"
+    far = looks_at("washbasin", EXTINGUISHER)
     near = (
-        look("near", 1.0, 1.0, ("fire extinguisher", Point(1.5, 0.2))),
-        look("near too", 2.0, 1.0, ("fire extinguisher", Point(1.5, 0.2))),
+        look("near", 1.0, 1.0, ("washbasin", Point(1.5, 0.2))),
+        look("near too", 2.0, 1.0, ("washbasin", Point(1.5, 0.2))),
     )
     memory = SemanticMap(waypoints=(*far, *near))
     world = WorldModel(two_rooms(), Pose(6.0, 1.5), memory, radius_m=0.2)
-    recalled = recall(world, RecallQuery(words="tool to put out a fire"))
+    recalled = recall(world, RecallQuery(words=words))
     nearest = recalled.candidates[0].id
     assert nearest == "T2"
     with pytest.raises(GoalError, match=f"use {nearest}") as caught:
-        find_place(world, "tool to put out a fire")
+        find_place(world, words)
     assert caught.value.hint.index(nearest) < caught.value.hint.index(recalled.candidates[1].id)
     ways = [each.check.path_m or 0.0 for each in recalled.candidates]
     assert ways == sorted(ways)

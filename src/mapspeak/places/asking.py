@@ -85,6 +85,29 @@ class Recall:
         return Verdict.LIKELY if self.doubt else self.answer.verdict
 
 
+def _leave_out_viewpoints(answer: Answer, passing: Mapping[str, Remembered]) -> Answer:
+    """Return an answer in which no place that saw a thing that is meant is its rival."""
+    fitting = answer.candidates[: answer.n_meant]
+    meant = [passing[each.entry.id] for each in fitting]
+    seen_from = {
+        name for each in meant if isinstance(each, RememberedThing) for name in each.thing.waypoints
+    }
+    is_viewpoint = [
+        isinstance(each, RememberedPlace) and each.waypoint.name in seen_from for each in meant
+    ]
+    if not any(is_viewpoint):
+        return answer
+    things = [each for each, is_left in zip(fitting, is_viewpoint, strict=True) if not is_left]
+    n_meant = answer.n_meant - sum(is_viewpoint)
+    is_one = n_meant == 1 and answer.verdict is Verdict.SEVERAL
+    return replace(
+        answer,
+        candidates=(*things, *answer.candidates[answer.n_meant :]),
+        n_meant=n_meant,
+        verdict=Verdict.FOUND if is_one else answer.verdict,
+    )
+
+
 MOST_TIED = 30
 """Up to this number, equally likely candidates are sorted by path; beyond, by id."""
 
@@ -99,6 +122,7 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
     if moved := _find_moved(world, query, answer, passing):
         passing = {id_: each for id_, each in passing.items() if id_ not in moved}
         answer = _find(world, query, passing)
+    answer = _leave_out_viewpoints(answer, passing)
     is_tied = 1 < answer.n_meant <= MOST_TIED
     best = _find_best_known(world, answer, passing, query.room_id) if is_tied else None
     if best is not None:
@@ -120,15 +144,20 @@ def recall(world: WorldModel, query: RecallQuery) -> Recall:
     )
 
 
+CALLED = (MatchField.NAME, MatchField.LABEL, MatchField.OTHER_NAME)
 BESIDE = (MatchField.DESCRIPTION, MatchField.PLACE)
 
 
 def leave_out_beside(recalled: Recall) -> Recall:
-    """Return an answer that surely names something without what only stands beside such a thing."""
+    """Return an answer without what only stands beside a thing that is meant.
+
+    What is meant is surely named, or has words of the request in its own label.
+    """
     answer = recalled.answer
-    if not answer.is_sure:
+    fitting = answer.candidates[: answer.n_meant]
+    if not answer.is_sure and not all(each.field in CALLED for each in fitting):
         return recalled
-    meant = {each.entry.id for each in answer.candidates[: answer.n_meant]}
+    meant = {each.entry.id for each in fitting}
     kept = tuple(
         each
         for each in recalled.candidates

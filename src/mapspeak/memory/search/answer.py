@@ -280,7 +280,7 @@ class Answer:
         is_sure: The name of the first is the one meant, though several may share it.
         limits: Limitations of the search, in words; None without any.
         missing: A kind that is not remembered and more similar to the request than anything
-            remembered; None without one, or without a model.
+            remembered, where the request calls it by name or a model compares meanings; else None.
     """
 
     query: str

@@ -82,7 +82,8 @@ class _Asked:
         common: The same words, as found in general knowledge.
         ratios: By the texts of the entry and general knowledge.
         part_ratios: By all texts of any entry, if meanings were compared.
-        missing: A kind that is not remembered and may be meant, with its similarity.
+        missing: A kind that is not remembered and may be meant, if it can be told, with its
+            similarity.
     """
 
     request: str
@@ -90,7 +91,7 @@ class _Asked:
     common: tuple[AskedWords, ...]
     ratios: Floats
     part_ratios: Floats | None
-    missing: tuple[str, float] | None
+    missing: tuple[str | None, float] | None
 
     def basis(self, number: int) -> Basis:
         if self.ratios[number] > _MOST_WITHOUT_NAME:

@@ -255,8 +255,12 @@ class KindIndex:
         row = int(np.where(absent, ratios, -1.0).argmax())
         return read_kinds()[self._numbers[row]].names[0], float(ratios[row])
 
-    def find_missing_said(self, request: str) -> tuple[str, float] | None:
-        """Find the kind that is not remembered and that a request names, or says most of."""
+    def find_missing_said(self, request: str) -> tuple[str | None, float] | None:
+        """Find the kind that is not remembered and that a request names, or says most of.
+
+        Returns:
+            Its first name, None where the request says no name of it, and the similarity.
+        """
         called, stems = find_kinds_called(request), content_stems(request)
         absent = (kind for kind in called if not self._n_known.get(kind))
         names = (name for kind in absent for name in kind.names if content_stems(name) == stems)
@@ -269,7 +273,10 @@ class KindIndex:
         asked = self._words.ask(request)
         ratios = self._words.score_ratios(asked, WHOLE_WORD_WEIGHTS, size=len(kinds))
         number = int(np.where(self._find_absent(), ratios, 0.0).argmax())
-        return (kinds[number].names[0], float(ratios[number])) if ratios[number] > 0 else None
+        if ratios[number] <= 0:
+            return None
+        is_named = says_name(request, kinds[number])
+        return kinds[number].names[0] if is_named else None, float(ratios[number])
 
     def _find_by_meaning(
         self, labels: Iterable[str], vectors: TextVectors, of_names: Floats
@@ -319,6 +326,17 @@ def calls_by_name(request: str, names: Iterable[str]) -> bool:
     return any(
         asked and stems and (ends_with(asked, stems) or ends_with(stems, asked)) for stems in own
     )
+
+
+def says_name(request: str, kind: ThingKind) -> bool:
+    """Return True if a request says a name of a kind, or a word of one and another of its uses."""
+    stems = set(content_stems(request))
+    named = [set(content_stems(name)) for name in kind.names]
+    if calls_by_name(request, kind.names) or any(name <= stems for name in named):
+        return True
+    used = set().union(*map(content_stems, kind.uses))
+    called = stems & set().union(*named)
+    return bool(called) and bool(stems & used - called)
 
 
 def denies(request: str) -> bool:

@@ -21,7 +21,7 @@ from mapspeak.places.relations.grammar import Several, Superlative, parse_relati
 from mapspeak.places.relations.vocabulary import Kind
 from mapspeak.server.text.findings import say_guess
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.wording import list_some, say_count
+from mapspeak.server.text.wording import list_some, say_count, shorten_around
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.remembered import RememberedPlace
 
@@ -81,9 +81,8 @@ def _say_words(evidence: Sequence[MatchEvidence]) -> Iterator[str]:
     for each in evidence:
         is_same = each.query_word.casefold() == each.found_word.casefold()
         said = each.found_word if is_same else f"{each.found_word} for {each.query_word}"
-        words_of.setdefault(f"its {each.field} {quote(each.text, most=LONGEST_QUOTE)}", []).append(
-            said
-        )
+        text = shorten_around(each.text, each.found_word, most=LONGEST_QUOTE)
+        words_of.setdefault(f"its {each.field} {quote(text)}", []).append(said)
     for text, words in words_of.items():
         yield f"{text} says {', '.join(words)}"
 

@@ -94,6 +94,17 @@ def shorten(text: str) -> str:
     return line if len(line) <= LONGEST_NAME else f"{line[: LONGEST_NAME - 3]}..."
 
 
+def shorten_around(text: str, word: str, *, most: int) -> str:
+    """Return a text on one line, where it is long the part around a word of it."""
+    line = " ".join(text.split())
+    at = line.find(word)
+    if len(line) <= most or at < 0:
+        return line[:most]
+    start = min(max(at + len(word) // 2 - most // 2, 0), len(line) - most)
+    before, behind = "..." if start else "", "..." if start + most < len(line) else ""
+    return f"{before}{line[start : start + most]}{behind}"
+
+
 def join_words(words: Iterable[str], nothing: str = "none") -> str:
     """Return words with a blank between them, or the word for none."""
     return " ".join(words) or nothing
