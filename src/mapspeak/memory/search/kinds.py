@@ -183,10 +183,6 @@ class KindIndex:
         self._n_known: dict[ThingKind, int] = {}
         self._absent: NDArray[np.bool_] | None = None
         self._said_of: dict[tuple[str, ...], Texts] = {}
-        self._words = WordIndex() if vectors is None else None
-        if self._words is not None:
-            for number, kind in numbered:
-                self._words.add(number, _texts_of(kind))
 
     def add(self, entries: Sequence[Entry]) -> None:
         """Count the kinds of entries as remembered."""
@@ -268,10 +264,8 @@ class KindIndex:
             return named, 1.0
         if called:
             return None
-        assert self._words is not None, "without a model words are compared"  # noqa: S101 - so
-        kinds = read_kinds()
-        asked = self._words.ask(request)
-        ratios = self._words.score_ratios(asked, WHOLE_WORD_WEIGHTS, size=len(kinds))
+        kinds, words = read_kinds(), _index_words()
+        ratios = words.score_ratios(words.ask(request), WHOLE_WORD_WEIGHTS, size=len(kinds))
         number = int(np.where(self._find_absent(), ratios, 0.0).argmax())
         if ratios[number] <= 0:
             return None
@@ -298,11 +292,14 @@ class KindIndex:
                     self._kinds_of[label] = (read_kinds()[self._numbers[number]],)
 
 
-def _texts_of(kind: ThingKind) -> Texts:
-    return (
-        *((MatchField.OTHER_NAME, name) for name in kind.names),
-        *((MatchField.USE, use) for use in kind.uses),
-    )
+@cache
+def _index_words() -> WordIndex:
+    """Return the words of all kinds, each by its number in the list; they never change."""
+    index = WordIndex()
+    for number, kind in enumerate(read_kinds()):
+        names = ((MatchField.OTHER_NAME, name) for name in kind.names)
+        index.add(number, (*names, *((MatchField.USE, use) for use in kind.uses)))
+    return index
 
 
 def is_carrier(label: str) -> bool:
