@@ -14,13 +14,7 @@ from mapspeak.spatial.grid import Mask, OccupancyGrid, Window
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
 from mapspeak.spatial.rooms.joining import STRIP
-from mapspeak.spatial.rooms.raster import (
-    SETTINGS,
-    Raster,
-    build_raster,
-    find_boxes,
-    find_cells,
-)
+from mapspeak.spatial.rooms.raster import build_raster, find_boxes, find_cells
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import Segmentation, segment
 
@@ -51,13 +45,11 @@ class RegionShape:
     Attributes:
         open_clearance_m: The largest clearance if what stands free in the region were gone.
         mean_clearance_m: The mean distance of its floor from the nearest wall.
-        is_half_seen: Part of its outline borders on unseen cells.
     """
 
     region: Region
     open_clearance_m: float
     mean_clearance_m: float
-    is_half_seen: bool
 
     @property
     def elongation(self) -> float:
@@ -105,19 +97,7 @@ def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionSh
         region=region,
         open_clearance_m=max(clearance[row, col], _open_clearance(inside) * raster.cell_size_m),
         mean_clearance_m=float(clearance[inside].mean()),
-        is_half_seen=_unseen_share(raster, inside, window) >= SETTINGS.half_seen_share,
     )
-
-
-def _unseen_share(raster: Raster, inside: Mask, window: Window) -> float:
-    """Return how much of the outline of a region borders on unseen cells."""
-    region = cv2.copyMakeBorder(
-        inside.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
-    )
-    outline = cv2.dilate(region, np.ones((3, 3), np.uint8)) > region
-    rows, cols = (slice(part.start - 1, part.stop + 1) for part in window)
-    seen = raster.free[rows, cols] | raster.occupied[rows, cols]
-    return float((seen[outline] == 0).mean())
 
 
 def _open_clearance(inside: Mask) -> float:
@@ -157,8 +137,7 @@ def classify(shape: RegionShape, *, n_parted: int, exits_m: Sequence[float]) -> 
     _, width_m = walked_size(shape)
     # Closets and stairs are strips behind one door that is narrower than they are.
     is_closet = len(exits_m) == 1 and exits_m[0] < RUN_ON_RATIO * width_m
-    is_way = shape.is_strip and (shape.is_half_seen or not is_closet)
-    leads_on = is_way or max(n_parted, 1) * shape.elongation > BEND
+    leads_on = (shape.is_strip and not is_closet) or max(n_parted, 1) * shape.elongation > BEND
     if leads_on and width_m < HALL_WIDTH_M:
         return RoomClass.CORRIDOR
     is_wide = leads_on or 2 * shape.region.clearance_m >= OPEN_SPACE_WIDTH_M
