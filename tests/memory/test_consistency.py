@@ -339,3 +339,17 @@ def test_one_bad_place_of_three_counts_by_a_third() -> None:
         judge_trust(alone.things[0], ()).ratio - judge_trust(alone.things[0], alone_findings).ratio
     )
     assert 0 < lost < alone_lost
+
+
+def test_a_look_from_the_other_side_of_a_wall_says_nothing_of_what_hangs_on_it() -> None:
+    room = "#" + "." * 30 + "#" + "." * 30 + "#"
+    grid = grid_from_text("\n".join(["#" * 63, *[room] * 24, "#" * 63]), resolution_m=0.1)
+    seen = [
+        place("a", 1.6, 1.3, mark("fire extinguisher"), yaw_deg=0.0),
+        place("b", 2.2, 0.6, mark("fire extinguisher", 41.2), yaw_deg=0.0),
+    ]
+    behind = place("c", 4.2, 1.3, mark("plant", 20.0), mark("clock", -20.0), yaw_deg=180.0)
+    memory = SemanticMap(waypoints=(*seen, behind))
+    found = find_things(memory, grid)
+    assert "fire extinguisher" in {thing.label for thing in found.things}
+    assert check_memory(memory, found) == ()

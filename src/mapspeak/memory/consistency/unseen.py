@@ -190,7 +190,8 @@ class UnseenThings:
         n_spots = max(len(spots), 1)
         enough = np.flatnonzero(is_ahead.sum(axis=1) >= LEAST_SHOWN_RATIO * n_spots)
         looks = [self._waypoints[i] for i in near[enough].tolist()]
-        in_sight = self.found.find_sight_ratios(looks, spots)
+        seen_from = np.array([(each.place.x, each.place.y) for each in thing.supporting])
+        in_sight = self.found.find_sight_ratios(looks, spots, seen_from=seen_from)
         return looks, np.where(is_ahead[enough], in_sight, 0.0).sum(axis=1) / n_spots
 
     def _is_told(self, thing: Thing, waypoint: Waypoint, bearing_rad: float) -> bool:

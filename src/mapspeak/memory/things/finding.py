@@ -27,7 +27,7 @@ from mapspeak.memory.things.sight import (
 from mapspeak.memory.things.thing import NOISE, Category, Thing, View
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.grid import FloatArray, Mask
 
 PLAIN_SIGHT_M = 5.0
 """Who stands no farther and has nothing between would see a thing."""
@@ -90,10 +90,18 @@ class Things:
     pools: dict[frozenset[str], Pool]
     n_joined: int = 0
 
-    def find_sight_ratios(self, looks: Sequence[Waypoint], points: FloatArray) -> FloatArray:
-        """Return how likely each waypoint (row) has each point in sight: less over furniture."""
+    def find_sight_ratios(
+        self, looks: Sequence[Waypoint], points: FloatArray, *, seen_from: FloatArray
+    ) -> FloatArray:
+        """Return how likely each waypoint (row) has each point in sight: less over furniture.
+
+        Args:
+            points: Where a thing may be, shape (n, 2), metres.
+            seen_from: Where it was seen from, shape (m, 2), metres: it is on that side of a wall.
+        """
         seen = [self._surroundings(each) for each in looks]
-        ways = points.T - np.array([[[e.pose.x], [e.pose.y]] for e in seen]).reshape(-1, 2, 1)
+        here = np.array([(each.pose.x, each.pose.y) for each in seen]).reshape(-1, 1, 2)
+        ways = (points - here).transpose(0, 2, 1)
         far_m = np.hypot(ways[:, 0], ways[:, 1])
         ahead = np.arctan2(ways[:, 1], ways[:, 0])
         rays = bearing_index(ahead - self.sight.grid.origin.yaw_rad)
@@ -101,7 +109,11 @@ class Things:
         met_m = np.array([(each.near_m, each.far_m) for each in seen]).reshape(-1, 2, N_RAYS)
         beside_m = np.take_along_axis(find_farthest_beside(met_m), rays[:, None], axis=2)
         is_near, is_far = (far_m[:, None] <= beside_m + SURFACE_M).transpose(1, 0, 2)
-        return np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
+        is_behind = (far_m > beside_m[:, 1]) & _are_opposite(
+            here - points, seen_from - points[:, None]
+        )
+        in_sight = np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
+        return np.where(is_behind, 0.0, in_sight)
 
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
         """Return how far one sees towards a point over what one may see over."""
@@ -298,16 +310,27 @@ def _find_against(
         yield tuple(alone[i] for i in near if _points_past(found, alone[i], each.group, at))
 
 
+def _are_opposite(looks: FloatArray, views: FloatArray) -> Mask:
+    """Return True for each look (row) and point that is on no side from which the point was seen.
+
+    Args:
+        looks: The way from each point to each look, shape (looks, n, 2).
+        views: The way from each point to where it was seen from, shape (n, m, 2).
+    """
+    return np.asarray((np.einsum("lnk,nmk->lnm", looks, views) < 0.0).all(axis=2))
+
+
 def _points_past(
     found: Things, view: WeighedView, group: Sequence[WeighedView], position: Point
 ) -> bool:
     at, bearing_rad = np.array([[position.x, position.y]]), view.landmark.bearing_rad or 0.0
+    places = np.array([(each.waypoint.pose.x, each.waypoint.pose.y) for each in group])
     return (
         all(view.waypoint is not each.waypoint for each in group)
         and _off_rad(view.waypoint.pose, bearing_rad, position) >= ELSEWHERE_RAD
         and _off_rad(view.waypoint.pose, 0.0, position) <= IN_PICTURE_RAD
         and name_the_same(view.landmark.label, group[0].landmark.label)
-        and bool(found.find_sight_ratios([view.waypoint], at).item() > LIKELY_RATIO)
+        and found.find_sight_ratios([view.waypoint], at, seen_from=places).item() > LIKELY_RATIO
     )
 
 
