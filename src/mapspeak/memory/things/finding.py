@@ -14,12 +14,20 @@ from mapspeak.memory.quoting import name_key
 from mapspeak.memory.things.joining import Group, Posteriors, divide_views, join_sightings
 from mapspeak.memory.things.labels import group_names, name_the_same
 from mapspeak.memory.things.likelihood import Seen, Surroundings, WeighedView, read_waypoints
-from mapspeak.memory.things.placing import Placement, measure_agreement, place, trust_range
+from mapspeak.memory.things.placing import (
+    Placement,
+    find_confidence_ratio,
+    measure_agreement,
+    place,
+    trust_range,
+    views_from_apart,
+)
 from mapspeak.memory.things.sight import (
     BODY_M,
     LATTICE_M,
     N_RAYS,
     SightMap,
+    are_opposite,
     bearing_index,
     build_sight_map,
     find_farthest_beside,
@@ -27,7 +35,7 @@ from mapspeak.memory.things.sight import (
 from mapspeak.memory.things.thing import NOISE, Category, Thing, View
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.grid import FloatArray
 
 PLAIN_SIGHT_M = 5.0
 """Who stands no farther and has nothing between would see a thing."""
@@ -109,7 +117,7 @@ class Things:
         met_m = np.array([(each.near_m, each.far_m) for each in seen]).reshape(-1, 2, N_RAYS)
         beside_m = np.take_along_axis(find_farthest_beside(met_m), rays[:, None], axis=2)
         is_near, is_far = (far_m[:, None] <= beside_m + SURFACE_M).transpose(1, 0, 2)
-        is_behind = (far_m > beside_m[:, 1]) & _are_opposite(
+        is_behind = (far_m > beside_m[:, 1]) & are_opposite(
             here - points, seen_from - points[:, None]
         )
         in_sight = np.where(is_near, 1.0, np.where(is_far, NOISE.seen_over_ratio, 0.0))
@@ -310,16 +318,6 @@ def _find_against(
         yield tuple(alone[i] for i in near if _points_past(found, alone[i], each.group, at))
 
 
-def _are_opposite(looks: FloatArray, views: FloatArray) -> Mask:
-    """Return True for each look (row) and point that is on no side from which the point was seen.
-
-    Args:
-        looks: The way from each point to each look, shape (looks, n, 2).
-        views: The way from each point to where it was seen from, shape (n, m, 2).
-    """
-    return np.asarray((np.einsum("lnk,nmk->lnm", looks, views) < 0.0).all(axis=2))
-
-
 def _points_past(
     found: Things, view: WeighedView, group: Sequence[WeighedView], position: Point
 ) -> bool:
@@ -347,11 +345,6 @@ def _rank(thing: Thing) -> Rank:
 LEAST_AGREEMENT = 2.0
 """A view that is less than so much likelier than by chance, given the others, places nothing."""
 
-_BEST_ODDS = 1e6
-"""However many views agree: they may all be of a map that is wrong."""
-_SAME_PLACE_M = 0.3
-"""Views from nearer to each other share their mistakes and count once."""
-
 
 def _describe(made_of: Evidence) -> Thing:
     located, unplaced, conflicting = made_of
@@ -362,7 +355,7 @@ def _describe(made_of: Evidence) -> Thing:
     ordered = sorted(views, key=lambda each: name_key(each.waypoint.name))
     labels = _by_votes(each.landmark.label for each in ordered)
     position = placement.position if placement else None
-    apart = list(_from_different_places(zip(views, shares, strict=True)))
+    apart = list(views_from_apart(zip(views, shares, strict=True)))
     times = (each.waypoint.dated(each.landmark).recorded_at for each in ordered)
     seen_at = [each for each in times if each is not None]
     return Thing(
@@ -374,7 +367,7 @@ def _describe(made_of: Evidence) -> Thing:
         uncertainty_m=placement.uncertainty_m if placement else None,
         supporting=tuple(_view(each, position) for each in ordered),
         conflicting=tuple(_view(each, position) for each in conflicting),
-        confidence_ratio=_confidence(apart),
+        confidence_ratio=find_confidence_ratio(apart),
         n_agreeing=sum(agreement >= LEAST_AGREEMENT for _, agreement in apart),
         whereabouts=placement.whereabouts if placement else None,
         first_seen=min(seen_at, default=None),
@@ -398,26 +391,3 @@ def _view(sighting: WeighedView, position: Point | None) -> View:
         far_m=place.distance_to(position) if position and has_way else None,
         off_rad=_off_rad(pose, bearing_rad or 0.0, position) if position and has_way else None,
     )
-
-
-def _confidence(apart: Iterable[tuple[WeighedView, float]]) -> float:
-    """Return how likely it is that not all views are wrong: the odds of each, multiplied.
-
-    The first view may be wrong in any way; a further one must be wrong and agree by chance.
-    """
-    odds = 1.0
-    for i, (each, agreement) in enumerate(apart):
-        odds *= (1 - each.wrong_ratio) / each.wrong_ratio * (agreement if i else 1.0)
-    odds = min(odds, _BEST_ODDS)
-    return odds / (1 + odds)
-
-
-def _from_different_places(
-    views: Iterable[tuple[WeighedView, float]],
-) -> Iterator[tuple[WeighedView, float]]:
-    places = list[Point]()
-    for each, agreement in views:
-        here = each.waypoint.pose.point
-        if all(here.distance_to(other) >= _SAME_PLACE_M for other in places):
-            places.append(here)
-            yield each, agreement

@@ -5,7 +5,7 @@ moves nothing (a mixture of a Gaussian and uniform outliers, for each view).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +33,10 @@ POSE_M = 0.1
 _NINETY_SIGMAS = math.sqrt(-2 * math.log(1 - HELD_RATIO))
 _SPREAD_M = _NINETY_SIGMAS * math.hypot(BODY_M / 2, POSE_M)
 """What the weight of cells leaves out: how deep a thing is, and what map and pose are good to."""
+_BEST_ODDS = 1e6
+"""However many views agree: they may all be of a map that is wrong."""
+_SAME_PLACE_M = 0.3
+"""Views from nearer to each other share their mistakes and count once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,6 +87,30 @@ def measure_agreement(sight: SightMap, views: Sequence[WeighedView]) -> tuple[fl
         weights = _normalised(every - logs[i])
         agreements.append(float(weights[np.searchsorted(cells, said.cells)] @ said.ratios))
     return tuple(agreements)
+
+
+def find_confidence_ratio(apart: Iterable[tuple[WeighedView, float]]) -> float:
+    """Return how likely it is that not all views are wrong: the odds of each, multiplied.
+
+    The first view may be wrong in any way; a further one must be wrong and agree by chance.
+    """
+    odds = 1.0
+    for i, (each, agreement) in enumerate(apart):
+        odds *= (1 - each.wrong_ratio) / each.wrong_ratio * (agreement if i else 1.0)
+    odds = min(odds, _BEST_ODDS)
+    return odds / (1 + odds)
+
+
+def views_from_apart(
+    views: Iterable[tuple[WeighedView, float]],
+) -> Iterator[tuple[WeighedView, float]]:
+    """Yield views, each with its agreement, but those from beside another one."""
+    places = list[Point]()
+    for each, agreement in views:
+        here = each.waypoint.pose.point
+        if all(here.distance_to(other) >= _SAME_PLACE_M for other in places):
+            places.append(here)
+            yield each, agreement
 
 
 def log_evidence(sight: SightMap, views: Sequence[WeighedView]) -> float:

@@ -195,6 +195,16 @@ def find_farthest_beside(far_m: FloatArray) -> FloatArray:
     return np.asarray(far_m[..., _BESIDE].max(axis=-1))
 
 
+def are_opposite(looks: FloatArray, views: FloatArray) -> Mask:
+    """Return True for each look (row) and point that is on no side from which the point was seen.
+
+    Args:
+        looks: The way from each point to each look, shape (looks, n, 2).
+        views: The way from each point to where it was seen from, shape (n, m, 2).
+    """
+    return np.asarray((np.einsum("lnk,nmk->lnm", looks, views) < 0.0).all(axis=2))
+
+
 _LEAST_MET = 0.05
 """Cells that a beam hardly ended in are left out."""
 
