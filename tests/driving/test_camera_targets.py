@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from drawing import grid_from_text
-from mapspeak.driving.exploration.camera import find_camera_target
+from mapspeak.driving.exploration.camera import find_camera_target, is_shown
 from mapspeak.driving.exploration.trips import Target
-from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.fieldofview import CameraView
@@ -112,3 +112,35 @@ def test_a_corner_in_which_nobody_has_looked_is_worth_a_picture_where_no_frontie
     assert target is not None
     assert target.pose.y > 1.4
     assert find(world.frontiers.frontiers) is None
+
+
+NICHE_AT_THE_END = """
+    #####################################################
+    #...#################################################
+    #...#################################################
+    #...#################################################
+    #...................................................#
+    #...................................................#
+    #...................................................#
+    #...................................................#
+    #####################################################
+"""
+
+
+@pytest.mark.parametrize(("x", "is_worth_it"), [(12.5, False), (4.0, True)])
+def test_the_robot_does_not_drive_far_for_little_new_wall(x: float, *, is_worth_it: bool) -> None:
+    grid = grid_from_text(NICHE_AT_THE_END, resolution_m=0.25)
+    views = [CameraView(Pose(at, 0.75, 0.0), math.pi) for at in (3.0, 8.0, 12.5)]
+    world = WorldModel(grid, Pose(x, 0.75, 0.0), SemanticMap(), radius_m=0.2)
+    target = find_camera_target(world, views, (), is_closed=lambda _: False)
+    assert (target is not None) is is_worth_it
+
+
+def test_a_stop_is_for_nothing_once_pictures_from_elsewhere_show_its_walls() -> None:
+    grid = grid_from_text(NICHE_AT_THE_END, resolution_m=0.25)
+    views = [CameraView(Pose(at, 0.75, 0.0), math.pi) for at in (3.0, 8.0, 12.5)]
+    world = WorldModel(grid, Pose(4.0, 0.75, math.pi), SemanticMap(), radius_m=0.2)
+    stop = Point(0.9, 1.6)
+    assert not is_shown(world, views, (), stop)
+    across = CameraView(Pose(1.2, 0.75, math.radians(110.0)), math.radians(60.0))
+    assert is_shown(world, [*views, across], (), stop)

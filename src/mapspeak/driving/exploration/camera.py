@@ -29,6 +29,7 @@ from mapspeak.places.standing import spread_places
 from mapspeak.robot import GoalState
 from mapspeak.safety import ApprovalScope
 from mapspeak.spatial.fieldofview import (
+    SIGHT_M,
     CameraView,
     find_half_view_rad,
     find_walls_by_heading,
@@ -39,13 +40,15 @@ from mapspeak.spatial.fieldofview import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray, Mask, OccupancyGrid
-from mapspeak.spatial.paths.rounds import find_shortest_rounds, find_ways_between
+from mapspeak.spatial.paths.rounds import find_ways_between, find_worthiest_first
 from mapspeak.worldmodel.model import WorldModel
 
 TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
 DRIVE_WORTH_M = 1.0
 """So much new wall all around a place is worth a drive there."""
+WAY_WORTH = 4.0
+"""So many metres of way are worth a metre of new wall; see `benchmarks/views.py`."""
 MOST_ORDERED = 9
 """What is farther off does not come first, and all orders of these are looked at."""
 SAME_SPOT_M = 0.15
@@ -126,8 +129,9 @@ def find_camera_target(
     """Find the pose to take the next picture in, or the frontier on the way there.
 
     First comes what can be seen by a turn in place. Then the robot takes the shortest way past the
-    frontiers and the stops that show what is left, so that it need not come back. Unknown floor
-    that no frontier leads to counts as wall: what it hides is shown by no drive to a frontier.
+    frontiers and the stops that show what is left, so that it need not come back. It goes out of
+    its way, and on at the end, only for stops that show enough for that. Unknown floor that no
+    frontier leads to counts as wall: what it hides is shown by no drive to a frontier.
 
     Args:
         views: The pictures so far, the latest last.
@@ -135,7 +139,7 @@ def find_camera_target(
         is_closed: Whether a drive to a place has just failed.
 
     Returns:
-        None where no stop is left, whatever frontiers are.
+        None where no stop is worth the way, whatever frontiers are.
     """
     grid = _wall_off_unknown(world.grid, frontiers)
     shown = mask_pictured(grid, views)
@@ -152,8 +156,20 @@ def find_camera_target(
         if can_be(target):
             return target
     stops = list(_cover_walls(world, grid, shown, half_rad, can_be))
-    beside = [Target(id=each.id, pose=each.pose, frontier=each) for each in frontiers]
+    beside = [(Target(id=each.id, pose=each.pose, frontier=each), 0.0) for each in frontiers]
     return _choose_first(world, [*stops, *beside]) if stops else None
+
+
+def is_shown(
+    world: WorldModel, views: Sequence[CameraView], frontiers: Sequence[Frontier], stop: Point
+) -> bool:
+    """Return True when pictures have shown on the way what a stop was worth the drive for."""
+    if world.robot.point.distance_to(stop) <= SAME_SPOT_M:
+        return False
+    grid = _wall_off_unknown(world.grid, frontiers)
+    near = [view for view in views if view.pose.point.distance_to(stop) <= 2 * SIGHT_M]
+    walls = find_walls_by_heading(grid, np.array([[stop.x, stop.y]]))
+    return bool(walls.measure_new(mask_pictured(grid, near)).sum() < DRIVE_WORTH_M)
 
 
 def _wall_off_unknown(grid: OccupancyGrid, frontiers: Sequence[Frontier]) -> OccupancyGrid:
@@ -171,8 +187,8 @@ def _cover_walls(
     shown: Mask,
     half_rad: float,
     can_be: Callable[[Target], bool],
-) -> Iterator[Target]:
-    """Return stops that show all the wall worth a drive: greedily, who shows most first."""
+) -> Iterator[tuple[Target, float]]:
+    """Return stops that show all the wall worth a drive, and how much each: the most first."""
     points, _ = spread_places(world)
     walls = find_walls_by_heading(grid, points)
     is_left = np.ones(len(points), dtype=np.bool_)
@@ -185,19 +201,27 @@ def _cover_walls(
         is_left[index] = False
         target = _target(Point(*points[index].tolist()), new_m[index], half_rad)
         if can_be(target):
-            yield target
+            yield target, float(total_m[index])
             all_around = CameraView(target.pose, half_view_rad=math.pi)
             shown = shown | mask_pictured(grid, [all_around])
 
 
-def _choose_first(world: WorldModel, goals: Sequence[Target]) -> Target:
-    """Return the first of the goals near by on the shortest way past them."""
-    ways_m = [(world.path_m(goal.pose.point), goal) for goal in goals]
-    reached = [(way_m, goal) for way_m, goal in ways_m if way_m is not None]
+def _choose_first(world: WorldModel, goals: Sequence[tuple[Target, float]]) -> Target | None:
+    """Return the first of the goals near by on the way past them that is worth most.
+
+    Args:
+        goals: With the new wall that each shows, in metres; frontiers are passed in any case.
+    """
+    ways_m = [(world.path_m(goal.pose.point), goal, new_m) for goal, new_m in goals]
+    reached = [(way_m, goal, new_m) for way_m, goal, new_m in ways_m if way_m is not None]
     near = sorted(reached, key=lambda each: each[0])[:MOST_ORDERED]
-    between_m = find_ways_between(world.distances, [goal.pose.point for _, goal in near])
-    rounds_m = find_shortest_rounds(np.array([way_m for way_m, _ in near]), between_m)
-    return near[int(rounds_m.argmin())][1]
+    first = find_worthiest_first(
+        np.array([way_m for way_m, _, _ in near]),
+        find_ways_between(world.distances, [goal.pose.point for _, goal, _ in near]),
+        np.array([WAY_WORTH * new_m for _, _, new_m in near]),
+        np.array([goal.frontier is not None for _, goal, _ in near]),
+    )
+    return None if first is None else near[first][1]
 
 
 def _is_taken(pose: Pose, views: Sequence[CameraView]) -> bool:

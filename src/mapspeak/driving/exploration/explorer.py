@@ -9,6 +9,7 @@ from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
 from mapspeak.driving.exploration.camera import (
     PictureContext,
     find_camera_target,
+    is_shown,
     is_view_due,
     measure_pictured_on,
     turn_for_picture,
@@ -210,14 +211,21 @@ class Explorer:
 
         The last goal of an exploration is driven to its end.
         """
+        is_last = self._bounds.n_goals is not None and self._trips.n_begun >= self._bounds.n_goals
         frontier = target.frontier
         if frontier is None:
-            return False
+            return not is_last and self._is_shown(world, target)
         if not has_room_at(world.grid, target.pose.point, radius_m=world.radius_m):
             return True
-        is_last = self._bounds.n_goals is not None and self._trips.n_begun >= self._bounds.n_goals
         is_gone = world.frontiers.find(target.id) is None
         return not is_last and (is_gone or remaining_ratio(world.grid, frontier) < SEEN_RATIO)
+
+    def _is_shown(self, world: WorldModel, target: Target) -> bool:
+        """Return True when pictures on the way have shown what a stop was for."""
+        if not self._bounds.for_camera or target.earlier is not None:
+            return False
+        views, frontiers = self._site.pictures.views, world.frontiers.frontiers
+        return is_shown(world, views, frontiers, target.pose.point)
 
     def _bound_reached(self, world: WorldModel) -> BoundKind | None:
         """Return which bound ends the exploration; None where it goes on."""

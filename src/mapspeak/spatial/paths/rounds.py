@@ -60,13 +60,48 @@ def _spread_together(distances: Mask, starts: IntArray, goals: IntArray) -> Floa
 def find_shortest_rounds(from_start_m: FloatArray, between_m: FloatArray) -> FloatArray:
     """Return for each stop the length of the shortest way that passes it first and then all others.
 
-    Exact, by dynamic programming over sets of stops (Held and Karp, 1962); for a dozen at most.
-
     Args:
-        from_start_m: To each of n stops, shape (n,).
+        from_start_m: To each of n stops, shape (n,); for a dozen at most.
         between_m: From stop to stop, shape (n, n).
     """
-    n_stops = len(from_start_m)
+    return np.asarray(from_start_m + _find_rests(between_m)[-1], dtype=np.float64)
+
+
+def find_worthiest_first(
+    from_start_m: FloatArray, between_m: FloatArray, worth_m: FloatArray, needed: Mask
+) -> int | None:
+    """Return the first stop of the way whose stops are worth most beyond its length.
+
+    This is the prize-collecting travelling salesman (Balas, 1989) on a way that ends anywhere.
+
+    Args:
+        from_start_m: To each of n stops, shape (n,); for a dozen at most.
+        between_m: From stop to stop, shape (n, n).
+        worth_m: The metres that each stop is worth, shape (n,).
+        needed: Stops that the way passes whatever they are worth, shape (n,).
+
+    Returns:
+        Its index; None where no stop is needed and no way is worth its length.
+    """
+    bits = 1 << np.arange(len(worth_m))
+    ways_m = from_start_m + _find_rests(between_m)
+    passes = (np.arange(len(ways_m))[:, None] & bits) != 0
+    gains_m = passes @ worth_m - ways_m.min(axis=1)
+    gains_m[0] = 0.0
+    gains_m[~passes[:, needed].all(axis=1)] = -math.inf
+    best = int(gains_m.argmax())
+    return int(ways_m[best].argmin()) if best else None
+
+
+def _find_rests(between_m: FloatArray) -> FloatArray:
+    """Return the shortest ways that begin at a stop and pass all of a set.
+
+    Exact, by dynamic programming over sets of stops (Held and Karp, 1962).
+
+    Returns:
+        Shape (2 ** n, n), by the set's bits and the first stop; infinite where that is not in it.
+    """
+    n_stops = len(between_m)
     bits = 1 << np.arange(n_stops)
     rest_m = np.full((1 << n_stops, n_stops), np.inf)
     rest_m[bits, np.arange(n_stops)] = 0.0
@@ -76,7 +111,7 @@ def find_shortest_rounds(from_start_m: FloatArray, between_m: FloatArray) -> Flo
         for first, bit in enumerate(bits):
             sets = visited[(n_visited == n_left) & (visited & bit != 0)]
             rest_m[sets, first] = (between_m[first] + rest_m[sets ^ bit]).min(axis=1)
-    return np.asarray(from_start_m + rest_m[-1], dtype=np.float64)
+    return rest_m
 
 
 def _coarser(mask: Mask, factor: int) -> Mask:
