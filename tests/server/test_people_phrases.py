@@ -201,7 +201,7 @@ async def test_how_a_phrase_was_read_is_said_by_the_drive_and_not_again(client: 
     assert asked["place"] == words
 
 
-@pytest.mark.parametrize("words", ["eastern half of C1"])
+@pytest.mark.parametrize("words", ["shortest tour of all rooms", "eastern half of C1"])
 async def test_what_shares_a_word_alone_is_not_offered_where_words_cannot_be_read(
     client: Client, words: str
 ) -> None:

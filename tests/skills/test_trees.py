@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mapspeak.errors import SkillError
-from mapspeak.server.text.skills.words import draw_mission, say_mission
+from mapspeak.server.text.skills import draw_mission, say_mission
 from mapspeak.skill import JsonValue, Schema, Skill, SkillEffect, parameter
 from mapspeak.skills.guarding import SkillGate
 from mapspeak.skills.missions import MissionBounds, MissionDesk, MissionRecord

@@ -142,7 +142,7 @@ async def _try(
     robot: str,
     guard: GuardChoice,
 ) -> None:
-    from mapspeak.server.text.skills.words import say_run  # noqa: PLC0415
+    from mapspeak.server.text.skills import say_run  # noqa: PLC0415
     from mapspeak.server.tools.skills.tools import read_values  # noqa: PLC0415
     from mapspeak.skill import SkillState  # noqa: PLC0415
 

@@ -36,7 +36,7 @@ from mapspeak.server.text.wording import show_controls
 from mapspeak.server.tools.caller import Asking, client_of
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.interfaces import Exposure
+from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.server.tools.skills.tools import call_skill
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import (

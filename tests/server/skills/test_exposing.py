@@ -22,7 +22,7 @@ from mapspeak.safety import CommandKind, Patterns, Policy
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import RosInquiry
 from mapspeak.server.tools.skills.book import SkillBook
-from mapspeak.server.tools.skills.interfaces import Exposure
+from mapspeak.server.tools.skills.exposing import Exposure
 from mapspeak.session import Session
 from rosserved import QUICK, time_passing
 

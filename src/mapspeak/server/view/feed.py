@@ -12,7 +12,7 @@ from anyio.streams.memory import MemoryObjectReceiveStream, MemoryObjectSendStre
 
 from mapspeak.errors import MapspeakError
 from mapspeak.robot import CameraPicture
-from mapspeak.server.text.skills.words import draw_mission, say_question
+from mapspeak.server.text.skills import draw_mission, say_question
 from mapspeak.server.tools.skills.book import SkillBook
 from mapspeak.server.view.calls import CallFeed
 from mapspeak.server.view.document import (

@@ -11,7 +11,7 @@ from mcp_types import ToolAnnotations
 from mapspeak.errors import ConfigError, MapspeakError, SkillError, say_nearest
 from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.memory.quoting import quote
-from mapspeak.server.text.skills.words import describe_skill
+from mapspeak.server.text.skills import describe_skill
 from mapspeak.server.tools.caller import LONGEST_WAIT_S
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name

@@ -16,7 +16,7 @@ from mapspeak.errors import GoalError, LinkError, MapError, MapspeakError, Skill
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.safety import current_caller
 from mapspeak.server.text.offered import say_error
-from mapspeak.server.text.skills.words import (
+from mapspeak.server.text.skills import (
     say_bounds,
     say_interrupted,
     say_mission,

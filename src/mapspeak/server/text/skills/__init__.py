@@ -1,1 +1,0 @@
-"""Skills and missions in words."""

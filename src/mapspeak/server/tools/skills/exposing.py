@@ -1,0 +1,170 @@
+"""Interfaces of a robot as tools: found when it offers them, withdrawn when it does not."""
+
+import fnmatch
+import logging
+import math
+import re
+from collections.abc import Awaitable, Callable, Collection
+from contextlib import suppress
+from dataclasses import KW_ONLY, dataclass, field
+
+import anyio
+
+from mapspeak.errors import LinkError, MapspeakError, PolicyError
+from mapspeak.ros.census import fetch_publishers, fetch_subscribers
+from mapspeak.ros.messages.fields import bare_type
+from mapspeak.safety import GuardedConnection
+from mapspeak.server.tools.ros.goals import RosAccess
+from mapspeak.server.tools.ros.inquiry import actions_of
+from mapspeak.server.tools.ros.services import find_folded
+from mapspeak.server.tools.skills.book import SkillBook
+from mapspeak.server.tools.skills.interfaces import Interface
+from mapspeak.skill import Skill
+from mapspeak.skills.skillsfile import Called
+
+MOST_EXPOSED = 100
+"""Tools; a model that reads more of them reads nothing else."""
+EVERY_S, KEPT_S = 2.0, 20.0
+PARTS_OF_ACTION = ("goal", "cancel", "status", "feedback", "result")
+MOST_NAME = 60
+RESERVED = frozenset({"wait_s", "for_s", "robot"})
+"""Names that no argument of a tool may have: they are the tool's own."""
+PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
+
+_Name = tuple[Called, str]
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class Exposure:
+    """Keeps the exposed skills of a book in step with the robot's interfaces of some names.
+
+    Attributes:
+        patterns: Of full names, as the shell writes them: "/gripper/*".
+        tell: Tells clients where tools have changed.
+        every_s: Between two looks, in wall time.
+        kept_s: For which a type, the ends of a topic, or one that failed, are not tried again.
+    """
+
+    ros: RosAccess
+    book: SkillBook
+    patterns: tuple[str, ...]
+    _: KW_ONLY
+    tell: Callable[[], Awaitable[None]]
+    every_s: float = EVERY_S
+    kept_s: float = KEPT_S
+    _asked_s: float = -math.inf
+    _known: dict[_Name, dict[Interface, Skill | None]] = field(default_factory=dict)
+
+    async def keep_looking(self) -> None:
+        """Look again and again; a robot out of reach keeps its tools until it is back.
+
+        One that was never there has none yet.
+        """
+        while True:
+            with suppress(MapspeakError):
+                if self.ros.inquiry.connection.lost_for_s is not None:
+                    self.forget()
+                await self.look()
+            await anyio.sleep(self.every_s)
+
+    def forget(self) -> None:
+        """Ask for everything anew with the next look: the robot may be another one."""
+        self._asked_s = -math.inf
+
+    async def look(self) -> None:
+        """Expose new interfaces, withdraw those that are gone, and tell clients of any change.
+
+        LinkError where the robot cannot be asked.
+        """
+        named, now_s = await self._list_named(), anyio.current_time()
+        if is_due := now_s >= self._asked_s + self.kept_s:
+            self._asked_s = now_s
+        self._known = {key: each for key, each in self._known.items() if key in named}
+        self._show()
+        for key, type_name in named.items():
+            if is_due or key not in self._known:
+                await self._ask(key, type_name)
+        self._show()
+        await self.tell()
+
+    def _show(self) -> None:
+        opened = (each for known in self._known.values() for each in known.values())
+        self.book.exposed = {each.spec.name: each for each in opened if each is not None}
+
+    async def _ask(self, key: _Name, type_name: str) -> None:
+        """Open what a name is; at an error all stays."""
+        known = self._known.setdefault(key, {})
+        with suppress(LinkError):
+            found = await self._fetch(*key, type_name)
+            for gone in known.keys() - found:
+                del known[gone]
+            for interface in found:
+                known[interface] = known.get(interface) or await self._open(interface, known)
+
+    async def _open(self, interface: Interface, known: Collection[Interface]) -> Skill | None:
+        """Return an interface as a skill; None where it cannot be, which is told once."""
+        base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
+        name = _name_tool(base, taken=self.book.taken_names)
+        try:
+            if len(self.book.exposed) >= MOST_EXPOSED:
+                said = f"{MOST_EXPOSED} tools are exposed already."
+                raise LinkError(said, hint="Name fewer of them.")
+            self._check_policy(interface)
+            skill = await self.book.open_interface(interface, name=name, reserved=RESERVED)
+        except MapspeakError as error:
+            if interface not in known:
+                logger.warning("%s is not exposed: %s", interface.name, error)
+            return None
+        self.book.exposed[name] = skill
+        return skill
+
+    def _check_policy(self, interface: Interface) -> None:
+        """Refuse an interface that the policy denies for its name: a tool would be of no use."""
+        connection, command = self.ros.inquiry.connection, interface.command
+        if command is None or not isinstance(connection, GuardedConnection):
+            return
+        if connection.is_name_denied(command):
+            raise PolicyError("The policy denies it.", hint="A person can allow it in policy.yaml.")
+
+    async def _list_named(self) -> dict[_Name, str]:
+        """Return what the robot offers now of the requested names, with the types of topics."""
+        connection = self.ros.inquiry.connection
+        graph, offered = await connection.fetch_graph(), await connection.fetch_services()
+        actions = actions_of(graph)
+        parts = {f"{action}/{part}" for action in actions for part in PARTS_OF_ACTION}
+        topics = (each for each in sorted(graph.types) if each not in parts)
+        services = (each for each in offered if each in self.patterns or find_folded(each) is None)
+        types = {
+            **{(Called.ACTION, name): "" for name in actions},
+            **{(Called.SERVICE, name): "" for name in services},
+            **{(Called.READ, name): graph.types[name] for name in topics},
+        }
+        return {
+            (called, name): kind
+            for (called, name), kind in types.items()
+            if "/_action/" not in name or (called is Called.SERVICE and name in self.patterns)
+            if any(fnmatch.fnmatchcase(name, pattern) for pattern in self.patterns)
+        }
+
+    async def _fetch(self, called: Called, name: str, kind: str) -> list[Interface]:
+        """Return an action or a service; or what a topic of a type is for, by its ends."""
+        inquiry = self.ros.inquiry
+        if called is Called.READ:
+            ends = {
+                Called.READ: await fetch_publishers(inquiry.connection, name),
+                Called.PUBLISH: await fetch_subscribers(inquiry.connection, name),
+            }
+            return [Interface(side, name, bare_type(kind)) for side in ends if ends[side].others]
+        is_action, connection = called is Called.ACTION, inquiry.connection
+        fetch = inquiry.fetch_action_type if is_action else connection.fetch_service_type
+        return [Interface(called, name, bare_type(await fetch(name)))]
+
+
+def _name_tool(name: str, *, taken: Collection[str]) -> str:
+    """Return what a name of ROS is called as a tool, like no other tool."""
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()[-MOST_NAME:].strip("_")
+    base = plain or "skill"
+    others = (f"robot_{base}{end}" for end in ("", *(f"_{n}" for n in range(2, 1000))))
+    return next(each for each in (base, *others) if each not in taken)
