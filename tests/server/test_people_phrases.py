@@ -216,6 +216,18 @@ async def test_what_shares_a_word_alone_is_not_offered_where_words_cannot_be_rea
     assert "Such words can be read: " in text
 
 
+@pytest.mark.parametrize("words", ["things", "everything seen", "last ten minutes", "all"])
+async def test_words_that_say_nothing_of_what_is_meant_find_nothing_and_sound_like_nothing(
+    client: Client, words: str
+) -> None:
+    table = {"label": "meeting table", "bearing_deg": 90, "range_m": 0.6}
+    hall = {"name": "hall", "description": "A hall.", "functional_landmarks": [table]}
+    await client.call_tool("write_semantic_data", hall)
+    answer = await client.call_tool("find_place", {"query": words})
+    assert report_of(answer)["verdict"] == "not_remembered"
+    assert "sounds like" not in text_of(answer)
+
+
 async def test_several_of_a_name_are_told_apart_by_what_each_is_called(client: Client) -> None:
     for label, x in (("extinguisher 1", 2.0), ("extinguisher 2", 9.0)):
         thing = {"label": label, "bearing_deg": 90, "range_m": 0.6}
