@@ -582,3 +582,19 @@ def test_labels_are_grouped_as_if_each_was_compared_with_all() -> None:
         ["red sink 2", "sink 2"],
         ["sink 1"],
     ]
+
+
+def test_views_that_only_seem_to_meet_beyond_what_nobody_saw_are_of_two_things() -> None:
+    unseen_between = [
+        "#" * 41,
+        *["#" + "." * 14 + "#" + "." * 24 + "#"] * 7,
+        *["#" + "." * 14 + "?" + "." * 24 + "#"] * 3,
+        *["#" + "." * 14 + "#" + "." * 24 + "#"] * 2,
+        "#" * 16 + "?" * 10 + "#" * 15,
+        *["#" + "." * 14 + "#" + "?" * 8 + "." * 16 + "#"] * 6,
+        *["#" + "." * 38 + "##"] * 12,
+        "#" * 41,
+    ]
+    one = look("a", 0.879, 6.291, ("waste bin", Point(1.821, 4.8)))
+    other = look("b", 6.723, 1.092, ("waste bin", Point(0.2, 2.411)))
+    assert len(things_of(one, other, text="\n".join(unseen_between))) == 2

@@ -4,9 +4,11 @@ Views that speak of no place together are divided first, so that a new view cost
 Votes of the others are added up over the map. The place with most votes is a thing; the views that
 it explains better than a thing of their own would are taken out, at most one from each pose, since
 who names two sees two. What is left votes again. Then every view may change to the thing that
-explains it best, and things that are better explained as one are joined.
+explains it best, things that are better explained as one are joined, and two views that do not
+bear each other out are parted.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 
 import cv2
@@ -21,6 +23,7 @@ from mapspeak.memory.things.placing import (
     find_middle,
     likelihood_of,
     log_evidence,
+    measure_agreement,
 )
 from mapspeak.memory.things.sight import SightMap, find_log_priors
 from mapspeak.memory.waypoint import Waypoint
@@ -116,7 +119,8 @@ def join_sightings(posteriors: "Posteriors", sightings: Sequence[WeighedView]) -
     groups = _take_peaks(posteriors.sight, sightings, ballot)
     for _ in range(N_SWEEPS):
         groups = _sweep(posteriors, sightings, groups, ballot)
-    return _merge(posteriors, groups)
+    merged = _merge(posteriors, groups)
+    return [each for group in merged for each in _part(posteriors, group)]
 
 
 class Posteriors:
@@ -244,6 +248,19 @@ def _merge(posteriors: Posteriors, groups: list[Group]) -> list[Group]:
             merged[b] = merged[b] + merged.pop(a)
             owner = [b if each == a else each for each in owner]
     return list(merged.values())
+
+
+def _part(posteriors: Posteriors, group: Group) -> list[Group]:
+    """Return two views apart that speak of far places, and of a common one no more than by chance.
+
+    Of more than two each was held against the others when they were swept.
+    """
+    sight = posteriors.sight
+    if len(group) != 2 or min(measure_agreement(sight, group)) >= 1.0:
+        return [group]
+    alone = [group[:1], group[1:]]
+    off_m = math.dist(*(find_middle(sight, posteriors.of(each)) for each in alone))
+    return alone if off_m > NEAR_M else [group]
 
 
 def _are_one(sight: SightMap, some: Group, others: Group) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from mapspeak.memory.quoting import clean_line, quote
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.ros.values import cut, show_message
+from mapspeak.server.text.values import cut, show_message
 from mapspeak.server.text.wording import say_count
 from mapspeak.skill import (
     Arguments,

@@ -14,8 +14,8 @@ from mapspeak.ros.definitions.types import Field
 from mapspeak.ros.port import RosConnection, find_nearest
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.ros.listening import say_loss, say_nodes
-from mapspeak.server.text.ros.values import cut, show_message, show_value
 from mapspeak.server.text.ros.views import view_fields
+from mapspeak.server.text.values import cut, show_message, show_value
 from mapspeak.server.text.wording import say_count
 
 

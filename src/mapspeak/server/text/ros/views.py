@@ -21,7 +21,7 @@ from mapspeak.ros.messages.grids import read_grid
 from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
 from mapspeak.ros.messages.poses import read_pose_stamped, read_transforms
 from mapspeak.ros.messages.scans import LaserScan, mend_scan, read_cloud, read_scan
-from mapspeak.server.text.ros.values import show_message, show_value
+from mapspeak.server.text.values import show_message, show_value
 from mapspeak.server.text.wording import say_point, say_pose
 from mapspeak.spatial.picture import EDGE_PX, draw_map_axis
 

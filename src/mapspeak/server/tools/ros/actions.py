@@ -9,7 +9,7 @@ from mapspeak.errors import LinkError
 from mapspeak.safety import Act
 from mapspeak.server.text.ros.listening import list_page, say_loss
 from mapspeak.server.text.ros.outcomes import NO_TYPE_TOLD, ONE_OF_BOTH, say_goal, say_goals
-from mapspeak.server.text.ros.values import cut
+from mapspeak.server.text.values import cut
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.caller import WaitForEnd
 from mapspeak.server.tools.ros.goals import RosAccess, TrackedGoal

@@ -14,7 +14,7 @@ from mapspeak.ros.messages.fields import Message
 from mapspeak.server.text.ros.frames import say_frames, say_transform
 from mapspeak.server.text.ros.listening import say_measured, say_senders, say_silent
 from mapspeak.server.text.ros.outcomes import refuse_name
-from mapspeak.server.text.ros.values import cut
+from mapspeak.server.text.values import cut
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.publishing import TRANSFORMS

@@ -26,7 +26,7 @@ from mapspeak.server.text.ros.outcomes import (
     say_new,
     say_set,
 )
-from mapspeak.server.text.ros.values import cut, say_descriptor, say_kind, show_value
+from mapspeak.server.text.values import cut, say_descriptor, say_kind, show_value
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.topics import Filter, Page

@@ -10,8 +10,8 @@ from pydantic import Field
 from mapspeak.ros.census import find_server
 from mapspeak.safety import Call
 from mapspeak.server.text.ros.listening import list_page, say_stamp
-from mapspeak.server.text.ros.values import cut, show_message
 from mapspeak.server.text.ros.views import view_fields
+from mapspeak.server.text.values import cut, show_message
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import full_name
 from mapspeak.server.tools.ros.topics import Filter, Page

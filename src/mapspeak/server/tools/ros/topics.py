@@ -32,8 +32,8 @@ from mapspeak.server.text.ros.outcomes import (
     UNPUBLISHED,
     say_subscribers,
 )
-from mapspeak.server.text.ros.values import cut
 from mapspeak.server.text.ros.views import MOST_SUMMED, TOGETHER, MessageView, view_messages
+from mapspeak.server.text.values import cut
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, full_name
 from mapspeak.server.tools.ros.publishing import LONGEST_S, PublishRun, check_frames
