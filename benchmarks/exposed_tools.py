@@ -42,7 +42,6 @@ from mapspeak.skill import (
     SkillEffect,
     SkillOutcome,
     SkillSpec,
-    succeeded,
 )
 from mapspeak.skills.arguments import schema_of
 from mapspeak.skills.layout import build_layout
@@ -147,7 +146,7 @@ async def _publish_all(
 
 
 async def _do_nothing(_arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
-    return succeeded()
+    return SkillOutcome()
 
 
 async def _time_listing() -> float:

@@ -72,7 +72,7 @@ async def play_transcript() -> str:
                 name="patrol",
                 tree=WITH_ROOM,
                 sentence="Looks whether the floor of a room is free",
-                parameters=["room=R2"],
+                parameters={"room": "R2"},
             )
             say("But sound the horn before you go in.")
             await call("save_mission", name="patrol", correction="sound the horn before going in")

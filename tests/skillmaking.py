@@ -15,7 +15,6 @@ from mapspeak.skill import (
     SkillOutcome,
     SkillProgress,
     SkillSpec,
-    SkillState,
 )
 from mapspeak.skills.guarding import is_as_wanted
 
@@ -55,7 +54,7 @@ class FakeSkill(Skill):
                 return await self.do(arguments)
         finally:
             self.n_ended += 1
-        return SkillOutcome(state=SkillState.SUCCEEDED, outputs=self.outputs)
+        return SkillOutcome(outputs=self.outputs)
 
 
 async def never(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:

@@ -81,6 +81,15 @@ class SkillCode(StrEnum):
     NOT_ACHIEVED = "not_achieved"
 
 
+_NOT_FAILED = {
+    SkillCode.DONE: SkillState.SUCCEEDED,
+    SkillCode.SENT: SkillState.SUCCEEDED,
+    SkillCode.CANCELLED: SkillState.CANCELLED,
+    SkillCode.STOPPED: SkillState.CANCELLED,
+    SkillCode.TOO_LATE: SkillState.TIMED_OUT,
+}
+
+
 @dataclass(frozen=True, slots=True)
 class SkillOutcome:
     """How a run of a skill ended.
@@ -92,7 +101,6 @@ class SkillOutcome:
         unmet: The condition that did not hold, for `PRECONDITION`.
     """
 
-    state: SkillState
     code: SkillCode = SkillCode.DONE
     _: KW_ONLY
     outputs: Arguments = field(default_factory=dict)
@@ -100,15 +108,10 @@ class SkillOutcome:
     quote: str = ""
     unmet: Arguments = field(default_factory=dict)
 
-
-def succeeded(**outputs: JsonValue) -> SkillOutcome:
-    """Return the outcome of a run that did what it should."""
-    return SkillOutcome(SkillState.SUCCEEDED, outputs=outputs)
-
-
-def failed(code: SkillCode = SkillCode.NOT_ACHIEVED, quote: str = "") -> SkillOutcome:
-    """Return the outcome of a run that did not."""
-    return SkillOutcome(SkillState.FAILED, code, quote=quote)
+    @property
+    def state(self) -> SkillState:
+        """The state in which the run ended."""
+        return _NOT_FAILED.get(self.code, SkillState.FAILED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

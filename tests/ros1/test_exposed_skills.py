@@ -69,8 +69,8 @@ async def test_a_mission_of_what_nodes_offer_is_cut_off_tried_again_saved_and_ca
     robot: RobotProcess, rosbridge_url: str, tmp_path: Path
 ) -> None:
     async with exposed(rosbridge_url, tmp_path) as caller:
-        await caller.ask("save_mission", name="visit", tree=TREE, parameters=["least"])
-        told = await caller.ask("run_mission", name="visit", values=["least=1"], wait_s=25)
+        await caller.ask("save_mission", name="visit", tree=TREE, parameters={"least": None})
+        told = await caller.ask("run_mission", name="visit", values={"least": "1"}, wait_s=25)
         begun = await caller.ask("move_base", **GOAL, target_pose_pose_position_x=6.0, wait_s=2)
         ended = await caller.ask("cancel_skill", run="S2")
         assert not robot.is_driving

@@ -106,8 +106,8 @@ async def test_a_mission_uses_what_nodes_offer_and_what_the_owner_says_of_it(
     async with exposed(link, robot, tmp_path) as caller:
         await caller.until(lambda tools: offered <= tools.keys())
         told = await caller.ask("run_mission", tree=tree, wait_s=20)
-        await caller.ask("save_mission", name="visit", tree=visit, parameters=["x"])
-        late = await caller.ask("run_mission", name="visit", values=["x=8"], wait_s=20)
+        await caller.ask("save_mission", name="visit", tree=visit, parameters={"x": None})
+        late = await caller.ask("run_mission", name="visit", values={"x": "8"}, wait_s=20)
         begun = await caller.ask("run_mission", tree="- spin: {target_yaw: 60}\n", wait_s=0)
         ended = await caller.ask("cancel_skill", run="S3")
         assert not robot.is_driving

@@ -69,7 +69,7 @@ async def test_a_persons_word_for_a_skill_covers_what_it_commands_and_no_more(
 
     async def do(_arguments: object) -> SkillOutcome:
         guard.clear(denied_usually, robot_s=0.0)
-        return SkillOutcome(state=SkillState.SUCCEEDED)
+        return SkillOutcome()
 
     skill = FakeSkill(spec("set_pose", is_always_asked=True), do=do)
     guarded = SkillGate(FakeFacts(), guard).hold(skill, is_through_guard=True)
@@ -89,7 +89,7 @@ async def test_a_word_for_a_skill_opens_nothing_that_a_person_has_denied(tmp_pat
 
     async def do(_arguments: object) -> SkillOutcome:
         guard.clear(Call(service="/set_initial_pose", type="", arguments={}), robot_s=0.0)
-        return SkillOutcome(state=SkillState.SUCCEEDED)
+        return SkillOutcome()
 
     skill = FakeSkill(spec("set_pose", is_always_asked=True), do=do)
     guarded = SkillGate(FakeFacts(), guard).hold(skill, is_through_guard=True)

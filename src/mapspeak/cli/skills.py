@@ -6,7 +6,7 @@ from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import anyio
 import click
@@ -21,10 +21,11 @@ from mapspeak.cli.shared.options import (
     add_options,
 )
 from mapspeak.cli.shared.robots import RobotChoice
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, SkillError
 
 if TYPE_CHECKING:
     from mapspeak.server.tools.skills.book import SkillBook
+    from mapspeak.skill import SkillSpec
     from mapspeak.skills.skillsfile import OwnersEntry
 
 ROBOT_OPTION = click.option(
@@ -143,13 +144,26 @@ async def _try(
     guard: GuardChoice,
 ) -> None:
     from mapspeak.server.text.skills import say_run  # noqa: PLC0415
-    from mapspeak.server.tools.skills.tools import read_values  # noqa: PLC0415
     from mapspeak.skill import SkillState  # noqa: PLC0415
 
     async with _open(entries, robot, guard) as book:
         skill = book.find(name)
-        given = read_values(skill.spec, list(arguments))
+        given = _read_values(skill.spec, arguments)
         run = await book.runs.begin(skill, given, wait_s=skill.spec.timeout_s)
         click.echo(say_run(run))
     if run.state is not SkillState.SUCCEEDED:
         sys.exit(1)
+
+
+def _read_values(spec: "SkillSpec", arguments: tuple[str, ...]) -> dict[str, Any]:
+    """Return arguments written as NAME=VALUE, as what their parameters hold."""
+    from mapspeak.skills.steps import parse_tree  # noqa: PLC0415
+
+    given: dict[str, Any] = {}
+    for each in arguments:
+        name, equals, value = (part.strip() for part in each.partition("="))
+        if not equals:
+            raise SkillError(f"{each[:60]!r} is no value.", hint="Write NAME=VALUE.")
+        is_text = spec.parameters.get(name, {}).get("type", "string") == "string"
+        given[name] = value if is_text else parse_tree(value)
+    return given

@@ -20,9 +20,7 @@ from mapspeak.skill import (
     SkillOutcome,
     SkillProgress,
     SkillSpec,
-    failed,
     parameter,
-    succeeded,
 )
 
 if TYPE_CHECKING:
@@ -58,7 +56,7 @@ def build_skills(robot: "SimulatedRobot", driven: Robot, equipment: Equipment) -
         spec: SkillSpec, doing: Doing, given: Arguments, on_progress: OnProgress
     ) -> SkillOutcome:
         if await robot.compute(partial(equipment.has_fault, spec.name)):
-            return failed(SkillCode.ABORTED, "The device reports a fault.")
+            return SkillOutcome(SkillCode.ABORTED, quote="The device reports a fault.")
         return await doing(hands, given, on_progress)
 
     return tuple(Skill(spec, partial(run, spec, doing)) for spec, doing in _SKILLS)
@@ -69,22 +67,22 @@ async def _dock(hands: Hands, given: Arguments, on_progress: OnProgress) -> Skil
     robot, equipment = hands.robot, hands.equipment
     place = await robot.compute(equipment.find_dock)
     if place is None:
-        return failed(quote="No dock answers within 2.5 m.")
+        return SkillOutcome(SkillCode.NOT_ACHIEVED, quote="No dock answers within 2.5 m.")
     if await robot.compute(equipment.dock_in_contact) is None:
         goal = (await robot.fetch_pose()).pose @ place
         if await _drive(hands.driven, goal) is not GoalState.ARRIVED:
-            return failed(SkillCode.ABORTED, "The way onto the dock is blocked.")
+            return SkillOutcome(SkillCode.ABORTED, quote="The way onto the dock is blocked.")
     dock = await robot.compute(equipment.dock_in_contact)
     if dock is None:
-        return failed(quote="The contacts of the dock do not touch.")
+        return SkillOutcome(SkillCode.NOT_ACHIEVED, quote="The contacts of the dock do not touch.")
     await robot.compute(partial(equipment.note, "dock", dock.name))
     wanted = given["until_percent"] / 100
     while (charge := equipment.charge_ratio) < wanted:
         on_progress(SkillProgress(values={"battery_percent": round(100 * charge, 1)}))
         await robot.sleep(LOOK_S)
         if await robot.compute(equipment.dock_in_contact) is None:
-            return failed(SkillCode.ABORTED, "The robot has left the dock.")
-    return succeeded(battery_percent=round(100 * charge, 1))
+            return SkillOutcome(SkillCode.ABORTED, quote="The robot has left the dock.")
+    return SkillOutcome(outputs={"battery_percent": round(100 * charge, 1)})
 
 
 async def _drive(robot: Robot, goal: Pose) -> GoalState:
@@ -105,11 +103,11 @@ async def _open_door(hands: Hands, _given: Arguments, _told: OnProgress) -> Skil
     robot, equipment = hands.robot, hands.equipment
     door = await robot.compute(equipment.find_shut_door)
     if door is None:
-        return failed(quote="No shut door answers within 1.8 m.")
+        return SkillOutcome(SkillCode.NOT_ACHIEVED, quote="No shut door answers within 1.8 m.")
     await robot.sleep(DOOR_S)
     await robot.compute(partial(equipment.open_door, door))
     await robot.compute(partial(equipment.note, "open_door", door.name))
-    return succeeded(width_m=door.width_m)
+    return SkillOutcome(outputs={"width_m": door.width_m})
 
 
 async def _move_pallet(
@@ -120,21 +118,24 @@ async def _move_pallet(
     pallet = await robot.compute(partial(equipment.find_pallet, is_lifted=not is_lifted))
     if pallet is None:
         which = "on the floor" if is_lifted else "that is lifted"
-        return failed(quote=f"No pallet {which} is within 1.8 m, or there is no forklift.")
+        return SkillOutcome(
+            SkillCode.NOT_ACHIEVED,
+            quote=f"No pallet {which} is within 1.8 m, or there is no forklift.",
+        )
     await robot.sleep(LIFT_S)
     await robot.compute(partial(equipment.lift, pallet, is_lifted=is_lifted))
     await robot.compute(partial(equipment.note, skill, pallet.name))
-    return succeeded()
+    return SkillOutcome()
 
 
 async def _speak(hands: Hands, given: Arguments, _told: OnProgress) -> SkillOutcome:
     await hands.robot.sleep(len(given["text"]) / LETTERS_PER_S)
     await hands.robot.compute(partial(hands.equipment.note, "speak", given["text"]))
-    return succeeded()
+    return SkillOutcome()
 
 
 async def _read_battery(hands: Hands, _given: Arguments, _told: OnProgress) -> SkillOutcome:
-    return succeeded(battery_percent=round(100 * hands.equipment.charge_ratio, 1))
+    return SkillOutcome(outputs={"battery_percent": round(100 * hands.equipment.charge_ratio, 1)})
 
 
 _UNTIL = parameter(

@@ -1,17 +1,17 @@
 """The arguments of a skill: checked against the schemas that its tool publishes."""
 
 import json
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, FiniteFloat, TypeAdapter, ValidationError
 
 from mapspeak.errors import SkillError, say_nearest
 from mapspeak.memory.quoting import quote
 from mapspeak.skill import Arguments, JsonValue, Schema
 
 MOST_SHOWN = 60
-FLAGS = {"true": True, "false": False}
 SAID = {
     "number": "a number",
     "integer": "a whole number",
@@ -37,6 +37,24 @@ MOST_SCHEMA = 4_000
 MOST_DESCRIPTION = 160
 MOST_NAMED = 12
 FULL_DEPTH = 8
+
+
+def _refuse_flag(value: JsonValue) -> JsonValue:
+    return None if isinstance(value, bool) else value
+
+
+def _write_number(value: JsonValue) -> JsonValue:
+    return plain(value) if isinstance(value, int | float) else value
+
+
+CONVERSIONS: Mapping[str, TypeAdapter[Any]] = {
+    "number": TypeAdapter(Annotated[FiniteFloat, BeforeValidator(_refuse_flag)]),
+    "integer": TypeAdapter(Annotated[int, BeforeValidator(_refuse_flag)]),
+    "string": TypeAdapter(Annotated[str, BeforeValidator(_write_number)]),
+    "boolean": TypeAdapter(bool),
+    "array": TypeAdapter(list[Any]),
+    "object": TypeAdapter(dict[str, Any]),
+}
 
 
 def check_arguments(
@@ -87,35 +105,12 @@ def check_value(schema: Schema, value: JsonValue, *, where: str, what: str) -> J
 
 def _convert(schema: Schema, value: JsonValue) -> JsonValue | None:
     """Return a value as one of its schema's type; None where it is none."""
-    fitting: JsonValue | None = None
-    match kind := schema.get("type"):
-        case "number" | "integer":
-            fitting = _number(kind, value)
-        case "string" if isinstance(value, str):
-            fitting = value
-        case "string" if isinstance(value, int | float) and "contentEncoding" not in schema:
-            fitting = plain(value)
-        case "boolean":
-            fitting = FLAGS.get(plain(value))
-        case "array" if isinstance(value, list | tuple):
-            fitting = list(value)
-        case None:
-            fitting = value
-    return fitting
-
-
-def _number(kind: str, value: JsonValue) -> JsonValue | None:
-    if isinstance(said := value, str):
-        for read in (float, int):
-            with suppress(ValueError):
-                value = read(said)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not abs(value) <= sys.float_info.max:
-        return None
-    if kind == "number":
-        return value
-    # Models write 3.0 for 3.
-    return int(value) if value == int(value) else None
+    kind = schema.get("type")
+    if kind is None or (kind == "string" and "contentEncoding" in schema):
+        return value if kind is None or isinstance(value, str) else None
+    with suppress(ValidationError):
+        return CONVERSIONS[kind].validate_python(value)
+    return None
 
 
 def _is_allowed(schema: Schema, value: JsonValue) -> bool:

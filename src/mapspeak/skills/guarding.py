@@ -21,7 +21,6 @@ from mapspeak.skill import (
     SkillEffect,
     SkillOutcome,
     SkillSpec,
-    SkillState,
     parameter,
 )
 from mapspeak.skills.arguments import check_arguments, plain
@@ -173,8 +172,8 @@ class SkillGate:
         """
         facts, guard, limit_s = self.facts, self.guard, spec.timeout_s
         if spec.needs and (unmet := await find_unmet(spec.needs, facts)):
-            return SkillOutcome(SkillState.FAILED, SkillCode.PRECONDITION, unmet=unmet)
-        late = SkillOutcome(SkillState.TIMED_OUT, SkillCode.TOO_LATE, numbers={"after_s": limit_s})
+            return SkillOutcome(SkillCode.PRECONDITION, unmet=unmet)
+        late = SkillOutcome(SkillCode.TOO_LATE, numbers={"after_s": limit_s})
         if guard is None or command is None:
             return await end_within(facts, limit_s, work) or late
         permit, said = guard.clear(command, robot_s=facts.now_s), "given up"

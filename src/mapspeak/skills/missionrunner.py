@@ -22,8 +22,6 @@ from mapspeak.skill import (
     SkillOutcome,
     SkillProgress,
     SkillState,
-    failed,
-    succeeded,
 )
 from mapspeak.skills.guarding import wait
 from mapspeak.skills.steps import Mission, Step, StepKind, fill_in
@@ -60,7 +58,7 @@ class MissionRunner:
     ending: set[anyio.CancelScope] = field(default_factory=set)
     news: anyio.Event = field(default_factory=anyio.Event)
     _account: list[str] = field(default_factory=list)
-    _last: SkillOutcome = field(default_factory=failed)
+    _last: SkillOutcome = field(default_factory=partial(SkillOutcome, SkillCode.NOT_ACHIEVED))
     _is_cut_off: bool = False
 
     def __post_init__(self) -> None:
@@ -84,8 +82,9 @@ class MissionRunner:
         if self._is_cut_off:
             return last
         if self._root.status is Status.SUCCESS:
-            return succeeded(**outputs)
-        return SkillOutcome(SkillState.FAILED, last.code, outputs=outputs, quote=last.quote)
+            return SkillOutcome(outputs=outputs)
+        code = last.code if last.state is SkillState.FAILED else SkillCode.NOT_ACHIEVED
+        return SkillOutcome(code, outputs=outputs, quote=last.quote)
 
     async def _do_leaf(self, step: Step) -> bool:
         self.states[step.number] = SkillState.RUNNING
@@ -99,7 +98,7 @@ class MissionRunner:
             self._note(f"{step.number} {step.skill}: cut off")
             raise
         except MapspeakError as error:
-            outcome = failed(SkillCode.REJECTED, error.message)
+            outcome = SkillOutcome(SkillCode.REJECTED, quote=error.message)
         self.states[step.number] = outcome.state
         if step.output:
             self._values[step.output] = {**outcome.outputs, "ended": str(outcome.state)}

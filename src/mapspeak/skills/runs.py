@@ -185,13 +185,13 @@ class SkillRun:
             with self._scope:
                 self.outcome = await self.skill.run(arguments, self._take_progress)
             if self.outcome is None:
-                self.outcome = SkillOutcome(SkillState.CANCELLED, self._why)
+                self.outcome = SkillOutcome(self._why)
         except MapspeakError as error:
             self.error = error
         except Exception:
             # One faulty skill must not end all that goes on beside it.
             logger.exception("The skill %s failed by a mistake in it", self.skill.spec.name)
-            self.outcome = SkillOutcome(SkillState.FAILED, SkillCode.LOST)
+            self.outcome = SkillOutcome(SkillCode.LOST)
         finally:
             self._ended_s = self.runs.read_clock_s()
             self._tell()

@@ -21,11 +21,11 @@ from mapspeak.skill import (
     OnProgress,
     Schema,
     Skill,
+    SkillCode,
     SkillEffect,
     SkillOutcome,
     SkillSpec,
     SkillState,
-    failed,
     parameter,
 )
 from mapspeak.skills.arguments import LIMITS, check_arguments, check_value
@@ -225,7 +225,7 @@ class OwnersEntry(_Written):
         if judge := wanted.get("by"):
             result = (await find_skill(judge).run({}, lambda _: None)).outputs
         has_succeeded = wanted["field"] in result and is_as_wanted(result[wanted["field"]], wanted)
-        return outcome if has_succeeded else replace(failed(), outputs=outcome.outputs)
+        return outcome if has_succeeded else replace(outcome, code=SkillCode.NOT_ACHIEVED)
 
 
 class _SkillsFile(_Written):

@@ -17,7 +17,7 @@ from mapspeak.errors import ConfigError
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.safety import Approval, CommandKind, Otherwise, Policy
 from mapspeak.server.text.world.drives import say_cause
-from mapspeak.skill import JsonValue, SkillCode, SkillOutcome, SkillState, parameter
+from mapspeak.skill import JsonValue, SkillCode, SkillOutcome, parameter
 from mapspeak.skills.guarding import CONDITIONS
 from mapspeak.skills.steps import CONTROL
 from missioning import missions
@@ -32,7 +32,7 @@ TWO_ROOMS = "- drive: R2\n- look\n- drive: R1\n- note: all is well\n"
 
 
 async def fail(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:
-    return SkillOutcome(state=SkillState.FAILED, code=SkillCode.ABORTED, quote="too heavy")
+    return SkillOutcome(SkillCode.ABORTED, quote="too heavy")
 
 
 async def test_a_mission_runs_by_itself_and_tells_what_was_done(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ async def test_repeat_until_every_and_parallel_do_what_they_say(tmp_path: Path) 
     async def count(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:
         nonlocal n
         n += 1
-        return SkillOutcome(state=SkillState.SUCCEEDED, outputs={"n": n})
+        return SkillOutcome(outputs={"n": n})
 
     counter, hang = FakeSkill(spec("count"), do=count), FakeSkill(spec("hang"), do=never)
     async with missions(tmp_path, counter, hang) as caller:
@@ -134,7 +134,7 @@ async def test_a_mission_says_how_many_of_its_rounds_did_all_their_steps(
     async def try_it(arguments: Mapping[str, JsonValue]) -> SkillOutcome:
         nonlocal n
         n += 1
-        return await fail(arguments) if n in fails else SkillOutcome(SkillState.SUCCEEDED)
+        return await fail(arguments) if n in fails else SkillOutcome()
 
     trial = FakeSkill(spec("trial"), do=try_it)
     tree = "- every_min: 5\n  times: 2\n  do: [trial, {note: done}]\n"
@@ -182,10 +182,10 @@ async def test_places_of_templates_and_after_a_skill_of_the_robot_are_left_to_th
 ) -> None:
     learn = FakeSkill(spec("learn_places"))
     async with missions(tmp_path, learn) as caller:
-        await caller.ask("save_mission", name="go", tree="- drive: '{to}'", parameters=["to"])
+        await caller.ask("save_mission", name="go", tree="- drive: '{to}'", parameters={"to": None})
         await caller.ask("save_mission", name="late", tree="- learn_places\n- drive: kitchen\n")
-        refused = await caller.refuse("run_mission", name="go", values=["to=kitchen"])
-        arrived = await caller.ask("run_mission", name="go", values=["to=R2"])
+        refused = await caller.refuse("run_mission", name="go", values={"to": "kitchen"})
+        arrived = await caller.ask("run_mission", name="go", values={"to": "R2"})
     assert "kitchen" in refused
     assert "succeeded" in arrived
 
@@ -368,7 +368,7 @@ async def test_a_skill_that_vanishes_or_breaks_mid_mission_fails_its_step_alone(
 
     async def vanish(_arguments: Mapping[str, JsonValue]) -> SkillOutcome:
         here.clear()
-        return SkillOutcome(state=SkillState.FAILED, code=SkillCode.LOST)
+        return SkillOutcome(SkillCode.LOST)
 
     here[0].do = vanish
     async with missions(tmp_path, here[0]) as caller:
@@ -588,14 +588,14 @@ async def test_a_saved_mission_is_a_skill_with_parameters_and_keeps_corrections(
             name="visit",
             tree="- drive: '{room}'\n- look\n",
             sentence="Visits a room",
-            parameters=["room=R2"],
+            parameters={"room": "R2"},
         )
         corrected = await caller.ask("save_mission", name="visit", correction="knock first")
         assert '"knock first"' in corrected
         assert "Its steps are as before" in corrected
         tools = {each.name: each for each in (await caller.client.list_tools()).tools}
         assert tools["visit"].input_schema["properties"]["room"]["default"] == "R2"
-        told = await caller.ask("run_mission", name="visit", values=["room=R1"])
+        told = await caller.ask("run_mission", name="visit", values={"room": "R1"})
         assert 'Remember, as a person said: "knock first"' in told
         within = await caller.ask("run_mission", tree="- visit: R2\n- visit\n")
         assert "succeeded" in within
@@ -644,11 +644,11 @@ async def test_a_parameter_of_a_saved_mission_is_a_number_where_a_step_wants_one
     tree = "- wait: '{seconds}'\n- check: {value: '{seconds}', above: 1, standing: '{rests}'}\n"
     async with missions(tmp_path) as caller:
         await caller.ask(
-            "save_mission", name="rest", tree=tree, parameters=["seconds=3", "rests=true"]
+            "save_mission", name="rest", tree=tree, parameters={"seconds": "3", "rests": "true"}
         )
         assert "succeeded after" in await caller.ask("run_mission", name="rest")
         assert "succeeded after" in await caller.ask("rest", seconds=2)
-        told = await caller.ask("run_mission", name="rest", values=["seconds=a while"])
+        told = await caller.ask("run_mission", name="rest", values={"seconds": "a while"})
     assert "duration_s cannot be 'a while'" in told
 
 

@@ -132,7 +132,9 @@ async def test_steps_follow_each_other_are_tried_again_replaced_and_cut_off(
 async def test_a_saved_mission_is_run_by_its_name(link: str, tmp_path: Path) -> None:
     async with worker(link, tmp_path) as robot:
         tree = "- retry: 3\n  do: [open_door]\n- drive: '{place}'\n"
-        await robot.ask("save_mission", name="go_through", tree=tree, parameters=["place=0.6, 0.0"])
+        await robot.ask(
+            "save_mission", name="go_through", tree=tree, parameters={"place": "0.6, 0.0"}
+        )
         told = await robot.ask("run_mission", name="go_through", wait_s=20.0)
         assert "succeeded" in await robot.until_over(told)
     assert robot.deeds[-1] == "open_door: store door"

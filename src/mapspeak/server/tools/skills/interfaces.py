@@ -1,7 +1,7 @@
 """Topics, services and actions of a robot as skills."""
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import anyio
@@ -23,10 +23,7 @@ from mapspeak.skill import (
     SkillOutcome,
     SkillProgress,
     SkillSpec,
-    SkillState,
-    failed,
     parameter,
-    succeeded,
 )
 from mapspeak.skills.layout import MessageLayout, build_layout
 from mapspeak.skills.skillsfile import Called
@@ -65,12 +62,12 @@ LASTS = {
     )
 }
 """The extra argument of a velocity: without an end the robot would go on."""
-OUTCOMES = {
-    ActionState.SUCCEEDED: (SkillState.SUCCEEDED, SkillCode.DONE),
-    ActionState.ABORTED: (SkillState.FAILED, SkillCode.ABORTED),
-    ActionState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
-    ActionState.REJECTED: (SkillState.FAILED, SkillCode.REJECTED),
-    ActionState.LOST: (SkillState.FAILED, SkillCode.LOST),
+CODES = {
+    ActionState.SUCCEEDED: SkillCode.DONE,
+    ActionState.ABORTED: SkillCode.ABORTED,
+    ActionState.CANCELLED: SkillCode.STOPPED,
+    ActionState.REJECTED: SkillCode.REJECTED,
+    ActionState.LOST: SkillCode.LOST,
 }
 
 
@@ -95,8 +92,8 @@ class _Opened:
         outputs = self._read(1, answer)
         if answer.get("success", True) is False:
             quote = str(answer.get("message", ""))
-            return replace(failed(SkillCode.ABORTED, quote), outputs=outputs)
-        return succeeded(**outputs)
+            return SkillOutcome(SkillCode.ABORTED, outputs=outputs, quote=quote)
+        return SkillOutcome(outputs=outputs)
 
     async def act(self, arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Send a goal and follow it; one that is given up is cancelled at its server."""
@@ -111,7 +108,7 @@ class _Opened:
             raise
         ended = tracked.goal
         outputs = {} if ended.result is None else self._read(1, ended.result)
-        return SkillOutcome(*OUTCOMES[ended.state], outputs=outputs, quote=ended.reason)
+        return SkillOutcome(CODES[ended.state], outputs=outputs, quote=ended.reason)
 
     async def publish(self, arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Publish once; a velocity for a time, then a stand, also where it is given up."""
@@ -120,16 +117,16 @@ class _Opened:
         await self.ros.publisher.publish(
             PublishRun(topic=name, type=self.described.said, message=message, duration_s=lasts_s)
         )
-        return SkillOutcome(SkillState.SUCCEEDED, SkillCode.SENT)
+        return SkillOutcome(SkillCode.SENT)
 
     async def read(self, _arguments: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Read the topic's latest message; wait for one, where none has come yet."""
         interface, wait_s = self.interface, self.spec.timeout_s
         heard = await self.ros.inquiry.hear(interface.name, interface.type, wait_s=wait_s)
         if not heard.messages:
-            return failed(SkillCode.NOT_ANSWERED)
-        outputs, age_s = self._read(0, heard.messages[0]), round(heard.age_s, 1)
-        return replace(succeeded(**outputs), numbers={"age_s": age_s})
+            return SkillOutcome(SkillCode.NOT_ANSWERED)
+        outputs = self._read(0, heard.messages[0])
+        return SkillOutcome(outputs=outputs, numbers={"age_s": round(heard.age_s, 1)})
 
     async def _check(self, arguments: Arguments) -> Message:
         """Return the message that the arguments are; refuse one that is denied or does not fit."""

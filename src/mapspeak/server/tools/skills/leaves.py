@@ -31,9 +31,7 @@ from mapspeak.skill import (
     SkillProgress,
     SkillSpec,
     SkillState,
-    failed,
     parameter,
-    succeeded,
 )
 from mapspeak.skills.guarding import CONDITIONS, end_within, find_unmet, is_as_wanted
 from mapspeak.skills.runs import Question, QuestionBook
@@ -48,12 +46,12 @@ READS, MOVES = SkillEffect.READS, SkillEffect.MOVES
 AHEAD = "ahead"
 PLACES = ("place", "in_room", "near")
 """The arguments of built-in skills that name a place."""
-ENDS = {
-    GoalState.CANCELLED: (SkillState.CANCELLED, SkillCode.STOPPED),
-    GoalState.PREEMPTED: (SkillState.CANCELLED, SkillCode.STOPPED),
-    GoalState.REJECTED: (SkillState.FAILED, SkillCode.REJECTED),
-    GoalState.TIMED_OUT: (SkillState.FAILED, SkillCode.TOO_LATE),
-    GoalState.LOST: (SkillState.FAILED, SkillCode.LOST),
+CODES = {
+    GoalState.CANCELLED: SkillCode.STOPPED,
+    GoalState.PREEMPTED: SkillCode.STOPPED,
+    GoalState.REJECTED: SkillCode.REJECTED,
+    GoalState.TIMED_OUT: SkillCode.TOO_LATE,
+    GoalState.LOST: SkillCode.LOST,
 }
 
 
@@ -221,7 +219,7 @@ class Leaves:
         picture_id = "" if taken is None else taken.id
         self.questions.keep(picture_id, sighting.picture)
         seen = ", ".join(each.label for each in sighting.detections)
-        return succeeded(picture=picture_id, seen=seen)
+        return SkillOutcome(outputs={"picture": picture_id, "seen": seen})
 
     async def _follow(self, drive: Drive, on_progress: OnProgress) -> SkillOutcome:
         """Wait for the end of a drive; cancelled meanwhile, the robot is left standing."""
@@ -236,10 +234,9 @@ class Leaves:
             if (status := report.status).state.is_final:
                 break
         if status.state is GoalState.ARRIVED:
-            return succeeded(place=drive.place)
-        state, code = ENDS.get(status.state, (SkillState.FAILED, SkillCode.ABORTED))
-        outputs, quote = {"place": drive.place}, say_cause(status.cause)
-        return SkillOutcome(state, code, outputs=outputs, quote=quote)
+            return SkillOutcome(outputs={"place": drive.place})
+        code, quote = CODES.get(status.state, SkillCode.ABORTED), say_cause(status.cause)
+        return SkillOutcome(code, outputs={"place": drive.place}, quote=quote)
 
     @_leaf(READS, 60.0, text=_text(300, required=True))
     async def note(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
@@ -257,12 +254,15 @@ class Leaves:
             name_map=session.memory.name_map,
         )
         fault = (await session.compute(keep)).fault
-        return failed(SkillCode.LOST, fault) if fault else succeeded(text=text, room=room_id or "")
+        if fault:
+            return SkillOutcome(SkillCode.LOST, quote=fault)
+        return SkillOutcome(outputs={"text": text, "room": room_id or ""})
 
     @_leaf(READS, 60.0, **CONDITIONS)
     async def check(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Succeed where all that is given holds now."""
-        return failed() if await find_unmet(given, self) else succeeded()
+        unmet = await find_unmet(given, self)
+        return SkillOutcome(SkillCode.NOT_ACHIEVED if unmet else SkillCode.DONE)
 
     @_leaf(READS, DAY_S, **CONDITIONS, within_s=_seconds(1, default=600.0))
     async def wait_for(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
@@ -270,15 +270,15 @@ class Leaves:
         until_s = self.now_s + given["within_s"]
         while await find_unmet(given, self):
             if self.now_s >= until_s:
-                return failed()
+                return SkillOutcome(SkillCode.NOT_ACHIEVED)
             await self.sleep(CHECK_EVERY_S)
-        return succeeded()
+        return SkillOutcome()
 
     @_leaf(READS, DAY_S + 60, duration_s=_seconds(0, required=True))
     async def wait(self, given: Arguments, _on_progress: OnProgress) -> SkillOutcome:
         """Wait."""
         await self.sleep(given["duration_s"])
-        return succeeded()
+        return SkillOutcome()
 
     @_leaf(
         READS,
@@ -309,10 +309,10 @@ class Leaves:
             self.questions.asked.remove(question)
             on_progress(SkillProgress())
         if question.answer is not None:
-            return succeeded(answer=question.answer, by="answered")
+            return SkillOutcome(outputs={"answer": question.answer, "by": "answered"})
         if "otherwise" in given:
-            return succeeded(answer=given["otherwise"], by="otherwise")
-        return failed(SkillCode.NOT_ANSWERED)
+            return SkillOutcome(outputs={"answer": given["otherwise"], "by": "otherwise"})
+        return SkillOutcome(SkillCode.NOT_ANSWERED)
 
 
 BUILT_IN = frozenset(spec.name for spec, _ in LEAVES)

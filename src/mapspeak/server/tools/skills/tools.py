@@ -1,6 +1,5 @@
 """The tools of skills and missions: call, ask, cancel; run, answer, save, show, forget."""
 
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -29,8 +28,8 @@ from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, find_reader
 from mapspeak.server.tools.skills.book import WAIT, WAITS, SkillBook, is_long
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
-from mapspeak.skill import Arguments, JsonValue, Skill, SkillSpec
-from mapspeak.skills.arguments import check_value
+from mapspeak.skill import Arguments, JsonValue, Skill
+from mapspeak.skills.arguments import check_arguments, check_value
 from mapspeak.skills.missions import MissionBounds
 from mapspeak.skills.runs import OnNews, SkillRun, SkillRuns
 from mapspeak.skills.skillsfile import (
@@ -51,13 +50,13 @@ Tree = Annotated[Any, WithJsonSchema({"type": "string", "description": "YAML or 
 Name = Annotated[str, Field(description="small letters, digits, _", pattern=NAME)]
 SavedName = Annotated[str | None, Field(description="of a saved mission", max_length=60)]
 Values = Annotated[
-    list[str] | None,
-    Field(description="of a saved mission: name=value each", max_length=MOST_ARGUMENTS),
+    dict[str, Any] | None,
+    Field(description="what a saved mission takes, by name", max_length=MOST_ARGUMENTS),
 ]
 Parameters = Annotated[
-    list[str] | None,
+    dict[str, str | None] | None,
     Field(
-        description="names that steps use as {name}; name=default where it may be left out",
+        description="names that steps use as {name}, each with its default, or null without one",
         max_length=MOST_ARGUMENTS,
     ),
 ]
@@ -191,7 +190,7 @@ class MissionTools:
             mission = self._open({"name": "mission", "within_min": within_min}, tree)
         else:
             mission = self._find_saved(name)
-        given = read_values(mission.spec, values or [])
+        given = check_arguments(mission.spec.parameters, values or {}, skill=mission.spec.name)
         bounds = await self._check(mission, given)
         run = await self._runs.begin(mission, given, wait_s=wait_s, on_news=tell_news(context))
         return f"{say_bounds(mission, bounds)}\n{say_run(run)}"
@@ -244,7 +243,11 @@ class MissionTools:
             written = {
                 "name": name,
                 "sentence": sentence,
-                "arguments": [_read_parameter(each) for each in parameters or []],
+                "arguments": [
+                    {"name": each, "kind": "text", "most": 200.0}
+                    | ({} if default is None else {"default": default})
+                    for each, default in (parameters or {}).items()
+                ],
                 "within_min": within_min,
                 "remember": [*kept, *([correction] if correction else [])],
             }
@@ -321,24 +324,3 @@ class MissionTools:
     def _show(self, name: str) -> str:
         mission = self._find_saved(name)
         return say_mission(mission, self._book.desk.check(mission))
-
-
-def _read_parameter(said: str) -> dict[str, JsonValue]:
-    """Return a parameter written as name or name=default, as a file has it."""
-    name, has_default, default = (each.strip() for each in said.partition("="))
-    if not re.fullmatch(NAME, name):
-        raise SkillError(f"{said[:60]!r} is no parameter.", hint="Write name, or name=default.")
-    written = {"name": name, "kind": "text", "most": 200.0}
-    return written | ({"default": default} if has_default else {})
-
-
-def read_values(spec: SkillSpec, values: list[str]) -> dict[str, JsonValue]:
-    """Return arguments written as name=value, as what their parameters hold."""
-    given: dict[str, JsonValue] = {}
-    for each in values:
-        name, equals, value = (part.strip() for part in each.partition("="))
-        if not equals:
-            raise SkillError(f"{each[:60]!r} is no value.", hint="Write name=value.")
-        is_text = spec.parameters.get(name, {}).get("type", "string") == "string"
-        given[name] = value if is_text else parse_tree(value)
-    return given
