@@ -7,8 +7,7 @@ from mapspeak.skills.runs import Question, QuestionBook
 
 
 def put(questions: QuestionBook, text: str, *, client: str) -> Question:
-    questions.put(question := Question(text=text, client=client, within_s=9.0))
-    return question
+    return questions.put({"question": text, "within_s": 9.0}, client=client)
 
 
 def test_only_the_client_that_runs_a_mission_answers_its_questions_while_it_is_there() -> None:

@@ -39,18 +39,19 @@ OF_FACTS = {
     "time_until": parameter("string", description="such as 06:00", maxLength=5),
     "not": parameter("boolean", description="the opposite", default=False),
 }
-CONDITIONS = {
-    **OF_FACTS,
+COMPARING = {
     "value": parameter("string", description="a result, such as {door.answer}", maxLength=1000),
     "is": parameter("string", description="the wanted value", maxLength=1000),
     "above": parameter("number", description="of the value"),
     "below": parameter("number", description="of the value"),
 }
-COMPARING = frozenset({"value", "is", "above", "below"})
+CONDITIONS = {**OF_FACTS, **COMPARING}
 TIMES = frozenset({"time_from", "time_until"})
 MODIFIERS = frozenset({"not", "within_m", "within_s"})
-LOOK_S = 0.05
-"""Wall time between two looks at the robot's clock."""
+LOOKS_S = (0.05, 0.25)
+"""The shortest and longest wall time between two looks at the robot's clock."""
+FASTEST = 20
+"""Times as fast as the wall clock, a robot's clock is read in time for a limit."""
 STILL_S = 1.0
 """Wall time after which a clock that shows the same stands still."""
 T = TypeVar("T")
@@ -215,7 +216,8 @@ async def wait(facts: Facts, duration_s: float) -> None:
     seen_s, passed_s = facts.now_s, 0.0
     moved_s = anyio.current_time()
     while passed_s < duration_s:
-        await anyio.sleep(LOOK_S)
+        left_s = (duration_s - passed_s) / FASTEST
+        await anyio.sleep(min(max(left_s, LOOKS_S[0]), LOOKS_S[1]))
         now_s, wall_s = facts.now_s, anyio.current_time()
         if now_s != seen_s:
             # A simulation that is begun anew sets its clock back.

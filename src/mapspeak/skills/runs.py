@@ -37,35 +37,32 @@ class Question:
     """A question that waits.
 
     Attributes:
+        given: The arguments of the leaf that asks it.
         client: The session that may answer it, as long as it is there; empty for anyone.
-        picture_id: Of its subject, such as "P3"; that of the latest picture where left out.
-        within_s: Robot time that it waits from when it is asked.
-        otherwise: The answer where none comes; None where its step fails then.
+        picture_id: Of its subject, such as "P3"; that of the latest picture where none is given.
     """
 
-    text: str
-    answers: tuple[str, ...] = ()
+    id: str
+    given: Arguments
     client: str
-    picture_id: str | None = None
-    within_s: float
-    otherwise: str | None = None
-    id: str = ""
-    picture: CameraPicture | None = None
+    picture_id: str
+    picture: CameraPicture | None
     answer: str | None = None
     is_answered: anyio.Event = field(default_factory=anyio.Event)
 
 
 @dataclass(eq=False)
 class QuestionBook:
-    """The questions of missions, the oldest first.
+    """The questions of missions, by their ids.
 
     Attributes:
         pictures: What they are about, by their ids.
+        waiting: Those that no answer was given to, the oldest first.
         gone: The clients whose questions anyone may answer: their missions go on without them.
     """
 
     pictures: dict[str, CameraPicture] = field(default_factory=dict)
-    asked: list[Question] = field(default_factory=list)
+    waiting: dict[str, Question] = field(default_factory=dict)
     gone: set[str] = field(default_factory=set)
     _n_asked: int = 0
 
@@ -75,27 +72,32 @@ class QuestionBook:
         for oldest in list(self.pictures)[:-MOST_PICTURES]:
             del self.pictures[oldest]
 
-    def put(self, question: Question) -> None:
-        """Let a question wait."""
+    def put(self, given: Arguments, *, client: str) -> Question:
+        """Return the question of a leaf, which waits from now on."""
         self._n_asked += 1
-        if question.picture_id is None:
-            question.picture_id = next(reversed(self.pictures), "")
-        question.id, question.picture = f"Q{self._n_asked}", self.pictures.get(question.picture_id)
-        self.asked.append(question)
-
-    @property
-    def waiting(self) -> list[Question]:
-        """Those that no answer was given to."""
-        return [each for each in self.asked if each.answer is None]
+        picture_id = given.get("picture", next(reversed(self.pictures), ""))
+        question = Question(
+            id=f"Q{self._n_asked}",
+            given=given,
+            client=client,
+            picture_id=picture_id,
+            picture=self.pictures.get(picture_id),
+        )
+        self.waiting[question.id] = question
+        return question
 
     def find(self, question_id: str | None, *, client: str | None) -> Question:
         """Return a question that waits for the session of a client; the oldest unless one is named.
 
         A person, whose client is None, may answer every one. SkillError where none waits.
         """
-        waiting, open_to = self.waiting, {"", client, *self.gone}
-        mine = {each.id: each for each in waiting if client is None or each.client in open_to}
-        if not mine and waiting:
+        open_to = {"", client, *self.gone}
+        mine = {
+            each.id: each
+            for each in self.waiting.values()
+            if client is None or each.client in open_to
+        }
+        if not mine and self.waiting:
             hint = "Only the client that runs the mission answers it."
             raise SkillError("No mission waits for an answer of yours.", hint=hint)
         if not mine:
@@ -108,14 +110,16 @@ class QuestionBook:
 
     def answer(self, question: Question, answer: str) -> str:
         """Give an answer, and return it as it is taken; SkillError where it is not."""
-        taken = {each.casefold(): each for each in question.answers}
+        answers = question.given.get("answers", ())
+        taken = {each.casefold(): each for each in answers}
         said = answer.strip()
         if taken and said.casefold() not in taken:
             raise SkillError(
                 f"{question.id} cannot be answered by {said[:60]!r}.",
-                hint=f"Give one of: {', '.join(question.answers)}.",
+                hint=f"Give one of: {', '.join(answers)}.",
             )
         question.answer = taken.get(said.casefold(), said)
+        self.waiting.pop(question.id, None)
         question.is_answered.set()
         return question.answer
 

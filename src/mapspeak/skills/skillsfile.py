@@ -57,6 +57,7 @@ _Target = Annotated[str, Field(min_length=1, max_length=200)]
 _Plain = str | float | int | bool
 _Kind = Literal["number", "whole", "text", "flag", "list"]
 _KINDS = {"whole": "integer", "text": "string", "flag": "boolean", "list": "array"}
+_SHOWN = {str: "string", bool: "boolean", list: "array", int: "number", float: "number"}
 _EFFECTS = {Called.READ: SkillEffect.READS, Called.MISSION: SkillEffect.MOVES}
 
 
@@ -107,11 +108,8 @@ class _Argument(_Written):
     def _guess(self) -> str:
         """Return the kind that its bounds, its default or its choices show."""
         shown = self.default if self.default is not None else next(iter(self.choices), None)
-        for kind, shows in ((bool, "boolean"), (str, "string"), (list, "array")):
-            if isinstance(shown, kind):
-                return shows
-        is_number = shown is not None or (self.least, self.most, self.unit) != (None, None, "")
-        return "number" if is_number else "string"
+        is_number = (self.least, self.most, self.unit) != (None, None, "")
+        return _SHOWN.get(type(shown), "number" if is_number else "string")
 
 
 def _checked(parameters: Mapping[str, Schema]) -> AfterValidator:

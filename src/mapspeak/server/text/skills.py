@@ -186,17 +186,18 @@ def _say_outcome(outcome: SkillOutcome) -> str:
 
 def say_question(question: Question) -> str:
     """Return a question with the answers that are taken."""
-    taken = f" Answers: {', '.join(map(_say_value, question.answers))}." if question.answers else ""
+    given = question.given
+    answers, fallback = given.get("answers"), given.get("otherwise")
+    taken = f" Answers: {', '.join(map(_say_value, answers))}." if answers else ""
     about = "" if question.picture is None else f" About picture {question.picture_id}."
-    fallback = question.otherwise
     ends = "the step fails" if fallback is None else f"it is {_say_value(fallback)}"
-    waits = f" It waits {question.within_s:g} s; without an answer {ends}."
-    return f"{question.id}: {quote(question.text, most=MOST_SENTENCE)}.{taken}{waits}{about}"
+    waits = f" It waits {given['within_s']:g} s; without an answer {ends}."
+    return f"{question.id}: {quote(given['question'], most=MOST_SENTENCE)}.{taken}{waits}{about}"
 
 
 def say_waiting(questions: QuestionBook) -> str:
     """Return the questions that wait, with how they are answered."""
-    asked = [say_question(each) for each in questions.waiting]
+    asked = [say_question(each) for each in questions.waiting.values()]
     return "\n".join([*asked, lead("{answer_mission} answers it.")]) if asked else ""
 
 

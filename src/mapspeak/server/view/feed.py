@@ -228,10 +228,10 @@ def _describe_missions(book: SkillBook) -> MissionsView:
             QuestionView(
                 id=each.id,
                 said=say_question(each),
-                answers=each.answers,
+                answers=tuple(each.given.get("answers", ())),
                 picture="" if each.picture is None else f"questions/{each.id}",
             )
-            for each in book.runs.questions.waiting
+            for each in book.runs.questions.waiting.values()
         ),
         saved=tuple(draw_mission(each) for each in book.saved.values()),
     )

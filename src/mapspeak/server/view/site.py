@@ -206,10 +206,9 @@ class LiveSite:
     async def show_question(self, request: Request) -> Response:
         """Answer with the picture that a waiting question is about."""
         book = self._find(request).book
-        waiting = () if book is None else book.runs.questions.waiting
-        wanted = request.path_params["question"]
-        picture = next((each.picture for each in waiting if each.id == wanted), None)
-        if picture is None:
+        waiting = {} if book is None else book.runs.questions.waiting
+        question = waiting.get(request.path_params["question"])
+        if question is None or (picture := question.picture) is None:
             raise HTTPException(HTTPStatus.NOT_FOUND, "That question waits no longer.")
         return Response(picture.data, media_type=picture.media_type)
 

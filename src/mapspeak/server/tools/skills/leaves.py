@@ -10,7 +10,6 @@ from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Point
 from mapspeak.memory.episodes.observation import ObservationKind
-from mapspeak.places.naming import find_named
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.robot import GoalState
 from mapspeak.safety import current_caller
@@ -34,11 +33,10 @@ from mapspeak.skill import (
     parameter,
 )
 from mapspeak.skills.guarding import CONDITIONS, end_within, find_unmet, is_as_wanted
-from mapspeak.skills.runs import Question, QuestionBook
+from mapspeak.skills.runs import QuestionBook
 
 BATTERY = "sensor_msgs/BatteryState"
 HEAR_S = 3.0
-KEPT_S = 2.0
 WAIT_S = 5.0
 CHECK_EVERY_S = 1.0
 HOUR_S, DAY_S = 3600.0, 86_400.0
@@ -87,7 +85,6 @@ class Leaves:
     session: Session
     ros: RosAccess
     questions: QuestionBook
-    _battery: tuple[float | None, float] | None = None
 
     def list_skills(self) -> Iterator[Skill]:
         """Yield each as a skill."""
@@ -117,12 +114,8 @@ class Leaves:
                     found = None if battery is None else is_as_wanted(battery, {key: value})
                 case "standing":
                     found = self.session.drives.is_busy is not value
-                case "in_room":
-                    found = await self._is_in(value)
-                case "near":
-                    world = await self.session.fetch_world_model()
-                    there = await self.session.compute(lambda: find_place(world, value).point)
-                    found = (await self._here()).distance_to(there) <= wanted.get("within_m", 1.0)
+                case "in_room" | "near":
+                    found = await self._is_at(name, wanted)
                 case "event":
                     found = self._has_event(value)
                 case _:
@@ -133,12 +126,6 @@ class Leaves:
         """Return how full the battery is: as the robot itself tells, else a topic of its ROS."""
         if self.session.skilled is not None:
             return await self.session.skilled.fetch_battery()
-        # A simulation that is begun anew sets its clock back.
-        if self._battery is None or not 0.0 <= self.now_s - self._battery[1] <= KEPT_S:
-            self._battery = (await self._hear_battery(), self.now_s)
-        return self._battery[0]
-
-    async def _hear_battery(self) -> float | None:
         inquiry = self.ros.inquiry
         topics = {} if self.session.ros is None else (await inquiry.fetch_topics()).types
         if (topic := next((name for name in topics if topics[name] == BATTERY), None)) is None:
@@ -147,14 +134,18 @@ class Leaves:
         share = messages[0].get("percentage") if messages else None
         return float(share) if isinstance(share, int | float) and 0.0 <= share <= 1.0 else None
 
-    async def _is_in(self, room: str) -> bool | None:
+    async def _is_at(self, name: str, wanted: Arguments) -> bool:
+        """Return True where the robot is near a place, or in its room."""
         here, world = await self._here(), await self.session.fetch_world_model()
-        found = await self.session.compute(lambda: world.find_room_id(here))
-        if found == room.strip().upper():
-            return True
-        place = find_named(world, room)
-        is_there = place and found is not None and world.find_room_id(place.point) == found
-        return None if place is None else bool(is_there)
+
+        def judge() -> bool:
+            there = find_place(world, wanted[name]).point
+            if name == "near":
+                return here.distance_to(there) <= wanted.get("within_m", 1.0)
+            room_id = world.find_room_id(there)
+            return room_id is not None and room_id == world.find_room_id(here)
+
+        return await self.session.compute(judge)
 
     def _has_event(self, words: str) -> bool | None:
         """Return True while an event lasts in whose words these stand."""
@@ -293,20 +284,12 @@ class Leaves:
     )
     async def ask(self, given: Arguments, on_progress: OnProgress) -> SkillOutcome:
         """Ask the model or the person who runs the mission, and wait for the answer."""
-        question = Question(
-            text=given["question"],
-            answers=tuple(given.get("answers", ())),
-            client=current_caller().session,
-            picture_id=given.get("picture"),
-            within_s=given["within_s"],
-            otherwise=given.get("otherwise"),
-        )
-        self.questions.put(question)
+        question = self.questions.put(given, client=current_caller().session)
         on_progress(SkillProgress())
         try:
             await end_within(self, given["within_s"], question.is_answered.wait)
         finally:
-            self.questions.asked.remove(question)
+            self.questions.waiting.pop(question.id, None)
             on_progress(SkillProgress())
         if question.answer is not None:
             return SkillOutcome(outputs={"answer": question.answer, "by": "answered"})
