@@ -10,7 +10,8 @@ from typing import Protocol, TypeVar
 
 import anyio
 
-from mapspeak.errors import MapspeakError, SkillError
+from mapspeak.errors import SkillError
+from mapspeak.ros.link import plain_errors
 from mapspeak.safety import Guard, RunSkill, covered_by
 from mapspeak.skill import (
     Arguments,
@@ -190,21 +191,16 @@ class SkillGate:
 async def end_within(facts: Facts, limit_s: float, work: Callable[[], Awaitable[T]]) -> T | None:
     """Return the result of some work; None where it was cancelled at the time limit."""
     result: T | None = None
-    failure: MapspeakError | None = None
-    async with anyio.create_task_group() as tasks:
+    with plain_errors():
+        async with anyio.create_task_group() as tasks:
 
-        async def watch() -> None:
-            await wait(facts, limit_s)
-            tasks.cancel_scope.cancel()
+            async def watch() -> None:
+                await wait(facts, limit_s)
+                tasks.cancel_scope.cancel()
 
-        tasks.start_soon(watch)
-        try:
+            tasks.start_soon(watch)
             result = await work()
-        except MapspeakError as error:
-            failure = error
-        tasks.cancel_scope.cancel()
-    if failure is not None:
-        raise failure
+            tasks.cancel_scope.cancel()
     return result
 
 

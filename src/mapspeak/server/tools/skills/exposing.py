@@ -55,7 +55,8 @@ class Exposure:
     every_s: float = EVERY_S
     kept_s: float = KEPT_S
     _asked_s: float = -math.inf
-    _known: dict[_Name, dict[Interface, Skill | None]] = field(default_factory=dict)
+    _found: dict[_Name, list[Interface]] = field(default_factory=dict)
+    _opened: dict[Interface, Skill | None] = field(default_factory=dict)
 
     async def keep_looking(self) -> None:
         """Look again and again; a robot out of reach keeps its tools until it is back.
@@ -81,29 +82,22 @@ class Exposure:
         named, now_s = await self._list_named(), anyio.current_time()
         if is_due := now_s >= self._asked_s + self.kept_s:
             self._asked_s = now_s
-        self._known = {key: each for key, each in self._known.items() if key in named}
-        self._show()
+        asked, self._found = self._found, {key: self._found.get(key, []) for key in named}
         for key, type_name in named.items():
-            if is_due or key not in self._known:
-                await self._ask(key, type_name)
-        self._show()
+            if is_due or key not in asked:
+                # At an error all stays.
+                with suppress(LinkError):
+                    self._found[key] = await self._fetch(*key, type_name)
+        found = (interface for several in self._found.values() for interface in several)
+        opened = {each: self._opened.get(each) for each in found}
+        self.book.exposed = {each.spec.name: each for each in opened.values() if each is not None}
+        for interface, skill in opened.items():
+            if skill is None and (is_due or interface not in self._opened):
+                opened[interface] = await self._open(interface)
+        self._opened = opened
         await self.tell()
 
-    def _show(self) -> None:
-        opened = (each for known in self._known.values() for each in known.values())
-        self.book.exposed = {each.spec.name: each for each in opened if each is not None}
-
-    async def _ask(self, key: _Name, type_name: str) -> None:
-        """Open what a name is; at an error all stays."""
-        known = self._known.setdefault(key, {})
-        with suppress(LinkError):
-            found = await self._fetch(*key, type_name)
-            for gone in known.keys() - found:
-                del known[gone]
-            for interface in found:
-                known[interface] = known.get(interface) or await self._open(interface, known)
-
-    async def _open(self, interface: Interface, known: Collection[Interface]) -> Skill | None:
+    async def _open(self, interface: Interface) -> Skill | None:
         """Return an interface as a skill; None where it cannot be, which is told once."""
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
         name = _name_tool(base, taken=self.book.taken_names)
@@ -114,7 +108,7 @@ class Exposure:
             self._check_policy(interface)
             skill = await self.book.open_interface(interface, name=name, reserved=RESERVED)
         except MapspeakError as error:
-            if interface not in known:
+            if interface not in self._opened:
                 logger.warning("%s is not exposed: %s", interface.name, error)
             return None
         self.book.exposed[name] = skill

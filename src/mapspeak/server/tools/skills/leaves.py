@@ -137,11 +137,12 @@ class Leaves:
     async def _is_at(self, name: str, wanted: Arguments) -> bool:
         """Return True where the robot is near a place, or in its room."""
         here, world = await self._here(), await self.session.fetch_world_model()
+        within_m: float = wanted.get("within_m", 1.0)
 
         def judge() -> bool:
             there = find_place(world, wanted[name]).point
             if name == "near":
-                return here.distance_to(there) <= wanted.get("within_m", 1.0)
+                return here.distance_to(there) <= within_m
             room_id = world.find_room_id(there)
             return room_id is not None and room_id == world.find_room_id(here)
 
