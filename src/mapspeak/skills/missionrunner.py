@@ -4,7 +4,6 @@ import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 import anyio
 import py_trees
@@ -18,16 +17,14 @@ from mapspeak.errors import MapspeakError
 from mapspeak.skill import (
     Arguments,
     OnProgress,
+    Skill,
     SkillCode,
     SkillOutcome,
     SkillProgress,
     SkillState,
 )
-from mapspeak.skills.guarding import wait
+from mapspeak.skills.guarding import Facts, wait
 from mapspeak.skills.steps import Mission, Step, StepKind, fill_in
-
-if TYPE_CHECKING:
-    from mapspeak.skills.missions import MissionDesk, Parts
 
 MOST_TOLD = 40
 """Steps of the account that are told; the record on disk has all."""
@@ -41,16 +38,18 @@ class MissionRunner:
     """Runs one mission once.
 
     Attributes:
-        desk: Finds the skill of a leaf when that begins: it may have gone meanwhile.
-        mission: With a tree that was checked before, as were the missions within it, its parts.
+        mission: With a tree that was checked before.
+        find_skill: Finds the skill of a leaf when that begins: it may have gone meanwhile.
+        keep: Keeps what was done.
         states: Of the leaves that have begun, by their numbers.
         ending: What was cut off and has not ended yet; nothing new begins before.
     """
 
-    desk: "MissionDesk"
     mission: Mission
     given: Arguments
-    parts: "Parts"
+    facts: Facts
+    find_skill: Callable[[str], Skill]
+    keep: Callable[[str], None]
     on_progress: OnProgress
     states: dict[int, SkillState] = field(default_factory=dict)
     is_over: bool = False
@@ -64,7 +63,7 @@ class MissionRunner:
     def __post_init__(self) -> None:
         # py_trees prints its messages, and stdout belongs to the protocol.
         py_trees.logging.level = py_trees.logging.Level.ERROR
-        self._facts, self._values = self.desk.gate.facts, dict(self.given)
+        self._values = dict(self.given)
         self._root = self._build(self.mission.tree)
 
     async def run(self) -> SkillOutcome:
@@ -89,7 +88,7 @@ class MissionRunner:
     async def _do_leaf(self, step: Step) -> bool:
         self.states[step.number] = SkillState.RUNNING
         try:
-            skill = self.desk.find_part(step.skill, self.parts)
+            skill = self.find_skill(step.skill)
             given = fill_in(step.name_arguments(skill.spec), self._values)
             self._tell(now=f"{step.number} {step.skill}")
             outcome = await skill.run(given, partial(self._take_progress, step))
@@ -112,10 +111,10 @@ class MissionRunner:
 
     def _note(self, said: str) -> None:
         """Tell and keep what was done, with the time by the operator's clock, else the robot's."""
-        at = self._facts.read_calendar()
-        time = f"{self._facts.now_s:.0f} s" if at is None else f"{at:%H:%M:%S}"
+        at = self.facts.read_calendar()
+        time = f"{self.facts.now_s:.0f} s" if at is None else f"{at:%H:%M:%S}"
         self._account.append(f"{time} {said}")
-        self.desk.record.note(said)
+        self.keep(said)
         self._tell()
 
     def _take_progress(self, step: Step, progress: SkillProgress) -> None:
@@ -157,7 +156,7 @@ class MissionRunner:
         return node
 
     async def _expire(self, limit_s: float) -> bool:
-        await wait(self._facts, limit_s)
+        await wait(self.facts, limit_s)
         return False
 
     def _pace(self, period_s: float) -> Work:
@@ -166,10 +165,10 @@ class MissionRunner:
 
         async def keep() -> bool:
             nonlocal next_s
-            now_s = self._facts.now_s
+            now_s = self.facts.now_s
             begin_s = max(now_s, next_s)
             next_s = begin_s + period_s
-            await self._facts.sleep(begin_s - now_s)
+            await self.facts.sleep(begin_s - now_s)
             return True
 
         return keep

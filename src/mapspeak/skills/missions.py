@@ -45,50 +45,39 @@ Parts = Mapping[str, Mission]
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class MissionBounds:
-    """The bounds of a mission.
+    """What a mission can do at most, as the check of all its steps finds.
 
     Attributes:
         n_commands: The steps that do more than drive and read.
         asked: The skills in it for which a person is asked each time.
         parts: The missions within it, as they were when it was checked.
-    """
-
-    n_drives: int = 0
-    n_commands: int = 0
-    asked: frozenset[str] = frozenset()
-    parts: Parts = field(default_factory=dict, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class _Check:
-    """Checks a mission whole, or raises `SkillError`; counts drives, and steps that do more.
-
-    Attributes:
-        counts: Those that are known by now, by the mission's name and the count of missions
+        _counts: Those that are known by now, by the mission's name and the count of missions
             above it: missions of many missions would take as long as the product of their steps.
     """
 
     find_skill: Callable[[str], Skill]
-    counts: dict[tuple[str, int], tuple[int, int]] = field(default_factory=dict)
+    n_drives: int = 0
+    n_commands: int = 0
     asked: set[str] = field(default_factory=set)
     parts: dict[str, Mission] = field(default_factory=dict)
+    _counts: dict[tuple[str, int], tuple[int, int]] = field(default_factory=dict)
 
     def count(self, mission: Mission, above: tuple[str, ...] = ()) -> tuple[int, int]:
-        """Return the counts of a mission within those above."""
+        """Return the drives and commands of a mission within those above, or raise SkillError."""
         within = (*above, mission.spec.name)
         if mission.spec.name in above or len(above) >= MOST_NESTED:
             way = " -> ".join(within)
             raise SkillError(f"The mission holds itself: {way}.", hint="Leave one step out.")
-        if (key := (mission.spec.name, len(above))) not in self.counts:
-            self.counts[key] = self._add_up(mission.tree, set(mission.spec.parameters), within)
-        if (n_drives := self.counts[key][0]) > MOST_DRIVES:
+        if (key := (mission.spec.name, len(above))) not in self._counts:
+            self._counts[key] = self._add_up(mission.tree, set(mission.spec.parameters), within)
+        if (n_drives := self._counts[key][0]) > MOST_DRIVES:
             raise SkillError(
                 f"The mission could drive {n_drives:,} times, the limit is {MOST_DRIVES:,}.",
                 hint="Repeat less often.",
             )
-        return self.counts[key]
+        return self._counts[key]
 
     def _add_up(self, step: Step, names: set[str], within: tuple[str, ...]) -> tuple[int, int]:
         """Return the counts of a step and the steps within; collect the names of its outputs."""
@@ -237,9 +226,9 @@ class MissionDesk:
 
     def check(self, mission: Mission) -> MissionBounds:
         """Return what a mission can do at most, or raise SkillError where it cannot be run."""
-        check = _Check(self.find_skill)
-        n_drives, n_commands = check.count(mission)
-        return MissionBounds(n_drives, n_commands, frozenset(check.asked), check.parts)
+        bounds = MissionBounds(self.find_skill)
+        bounds.n_drives, bounds.n_commands = bounds.count(mission)
+        return bounds
 
     def open(self, entry: OwnersEntry, path: Path = Path()) -> Mission:
         """Return the mission of an entry, saved in a file; SkillError for a mistake in its tree."""
@@ -283,7 +272,8 @@ class MissionDesk:
         from mapspeak.skills.missionrunner import MissionRunner  # noqa: PLC0415
 
         given = check_arguments(mission.spec.parameters, arguments, skill=mission.spec.name)
-        return MissionRunner(self, mission, given, parts, on_progress)
+        find = partial(self._find_part, parts)
+        return MissionRunner(mission, given, self.gate.facts, find, self.record.note, on_progress)
 
     def _needs_word(self, spec: SkillSpec, bounds: MissionBounds) -> bool:
         """Return True where any part of a mission is of the kinds that need a person's word."""
@@ -293,7 +283,7 @@ class MissionDesk:
         asks_for_more = bounds.n_commands > 0 and bool(kinds - {CommandKind.DRIVE})
         return spec.is_always_asked or bool(bounds.asked) or asks_to_drive or asks_for_more
 
-    def find_part(self, name: str, parts: Parts) -> Skill:
+    def _find_part(self, parts: Parts, name: str) -> Skill:
         """Return the skill of a leaf as it is now; a mission as it was when it was approved.
 
         That is approved and recorded with the one around it.
