@@ -19,9 +19,9 @@ SAID = {
     "boolean": "true or false",
     "array": "a list",
     "object": "an object",
+    "base64": "bytes in base64",
     None: "a value",
 }
-IN_BASE64 = "bytes in base64"
 LIMITS = {
     "number": ("minimum", "maximum"),
     "integer": ("minimum", "maximum"),
@@ -47,13 +47,15 @@ def _write_number(value: JsonValue) -> JsonValue:
     return plain(value) if isinstance(value, int | float) else value
 
 
-CONVERSIONS: Mapping[str, TypeAdapter[Any]] = {
+CONVERSIONS: Mapping[str | None, TypeAdapter[Any]] = {
     "number": TypeAdapter(Annotated[FiniteFloat, BeforeValidator(_refuse_flag)]),
     "integer": TypeAdapter(Annotated[int, BeforeValidator(_refuse_flag)]),
     "string": TypeAdapter(Annotated[str, BeforeValidator(_write_number)]),
     "boolean": TypeAdapter(bool),
     "array": TypeAdapter(list[Any]),
     "object": TypeAdapter(dict[str, Any]),
+    "base64": TypeAdapter(str),
+    None: TypeAdapter(Any),
 }
 
 
@@ -87,10 +89,12 @@ def check_value(schema: Schema, value: JsonValue, *, where: str, what: str) -> J
         where: The name of the argument, or the path to a part of it.
         what: The skill's name.
     """
-    if (kind := schema.get("type")) == "object" and isinstance(value, Mapping):
+    if (kind := _kind_of(schema)) == "object" and isinstance(value, Mapping):
         fields = schema.get("properties", {})
         return check_arguments(fields, value, skill=what, path=f"{where}.")
-    fitting = _convert(schema, value)
+    fitting = None
+    with suppress(ValidationError):
+        fitting = CONVERSIONS[kind].validate_python(value)
     if fitting is None or not _is_allowed(schema, fitting):
         shown = repr(value)
         shown = shown if len(shown) <= MOST_SHOWN else f"{shown[: MOST_SHOWN - 3]}..."
@@ -103,14 +107,9 @@ def check_value(schema: Schema, value: JsonValue, *, where: str, what: str) -> J
     return fitting
 
 
-def _convert(schema: Schema, value: JsonValue) -> JsonValue | None:
-    """Return a value as one of its schema's type; None where it is none."""
-    kind = schema.get("type")
-    if kind is None or (kind == "string" and "contentEncoding" in schema):
-        return value if kind is None or isinstance(value, str) else None
-    with suppress(ValidationError):
-        return CONVERSIONS[kind].validate_python(value)
-    return None
+def _kind_of(schema: Schema) -> str | None:
+    kind: str | None = schema.get("contentEncoding", schema.get("type"))
+    return kind
 
 
 def _is_allowed(schema: Schema, value: JsonValue) -> bool:
@@ -130,17 +129,16 @@ def say_wanted(schema: Schema) -> str:
     """Return what a parameter takes, such as "a number from 0 to 0.085 m"."""
     if "enum" in schema:
         return f"one of {', '.join(map(str, schema['enum']))}"
-    wanted, (least, most) = SAID[schema.get("type")], find_limits(schema)
-    if schema.get("type") in ("number", "integer"):
+    kind, (least, most) = _kind_of(schema), find_limits(schema)
+    wanted = SAID[kind]
+    if kind in ("number", "integer"):
         from_least = "" if least is None else f" from {least:.15g}"
         to_most = "" if most is None else f" to {most:.15g}"
         return f"{wanted}{from_least}{to_most} {schema.get('unit', '')}".rstrip()
-    if schema.get("type") == "string":
-        wanted = IN_BASE64 if "contentEncoding" in schema else wanted
-        return wanted if most is None else f"{wanted} of at most {most:g} letters"
     if most is None:
         return wanted if least is None else f"{wanted} of at least {least:g}"
-    return f"{wanted} of {'' if least == most else 'at most '}{most:g} values"
+    what = "values" if kind == "array" else "letters"
+    return f"{wanted} of {'' if least == most else 'at most '}{most:g} {what}"
 
 
 def plain(value: JsonValue, digits: str = ".15g") -> str:
@@ -168,7 +166,7 @@ def _publish(schema: Schema, depth: int) -> dict[str, Any]:
         for word, each in schema.items()
         if word not in OURS and not (word in LIMITS.get(kind, ()) and abs(each) > LARGEST_SAID)
     }
-    said = [schema.get("unit"), IN_BASE64 if "contentEncoding" in schema else ""]
+    said = [schema.get("unit"), SAID["base64"] if "contentEncoding" in schema else ""]
     if description := schema.get("description"):
         said.append(quote(description, most=MOST_DESCRIPTION))
     if "items" in schema:
