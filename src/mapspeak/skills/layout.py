@@ -124,11 +124,11 @@ class _Builder:
         self, way: tuple[str, ...], *, path: tuple[str, ...], unit: str
     ) -> Iterator[tuple[tuple[str, ...], Schema]]:
         """Yield the fields of a message that are no messages themselves, all the way down."""
-        for field in self._book[way[-1]].fields:
+        for field in look_up(self._book, way[-1], above=way[:-1]).fields:
             where = (*path, field.name)
             if _is_message(field) and field.length is None:
-                inner, its_unit = self._enter(way, field), _unit(way, field, unit)
-                yield from self.leaves(inner, path=where, unit=its_unit)
+                its_unit = _unit(way, field, unit)
+                yield from self.leaves((*way, field.type), path=where, unit=its_unit)
             else:
                 yield where, self.describe(way, field, unit)
 
@@ -154,9 +154,8 @@ class _Builder:
     def _one(self, way: tuple[str, ...], field: Field, unit: str) -> Schema:
         """Return what a field, or one of its list, may be."""
         if _is_message(field):
-            inner = self._enter(way, field)
-            fields = self._book[inner[-1]].fields
-            within = {each.name: self.describe(inner, each, unit) for each in fields}
+            inner, message = (*way, field.type), look_up(self._book, field.type, above=way)
+            within = {each.name: self.describe(inner, each, unit) for each in message.fields}
             return parameter("object", properties=within)
         default = self._book.default(field) if field.default and field.length is None else None
         if field.type in TEXTS:
@@ -165,11 +164,6 @@ class _Builder:
         kind = "number" if is_number else "integer" if field.type in WHOLES else "boolean"
         least, most = WHOLES.get(field.type, (None, None))
         return parameter(kind, unit=unit, minimum=least, maximum=most, default=default)
-
-    def _enter(self, way: tuple[str, ...], field: Field) -> tuple[str, ...]:
-        """Return the way into a field that is a message."""
-        look_up(self._book, field.type, above=way)
-        return (*way, field.type)
 
     def _remark(self, way: tuple[str, ...], field: Field) -> str:
         """Return the definition's comment on a field; else the constants, of an only number."""
