@@ -8,6 +8,7 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError, MapError, SemanticMapError
+from mapspeak.geometry import Pose
 from mapspeak.memory.episodes.observation import (
     EpisodeFilter,
     EpisodeOrder,
@@ -354,14 +355,7 @@ class MemoryTools:
     def _keep_note(self, world: WorldModel, text: str) -> str:
         """Keep an event as an episode too; return why it could not, else nothing."""
         here = world.robot
-        keeping = self._session.episodes.keep(
-            ObservationKind.NOTE,
-            text=text,
-            pose=here,
-            room_id=world.find_room_id(here.point),
-            name_map=self._session.memory.name_map,
-        )
-        return keeping.fault
+        return keep_note(self._session, text, pose=here, room_id=world.find_room_id(here.point))
 
     async def _show(self, observation_id: str) -> list[str | Image]:
         if observation_id.strip().casefold() == UNDESCRIBED:
@@ -379,6 +373,16 @@ class MemoryTools:
         said = say_episode(match, now=self._session.find_wall_time())
         image = await load_picture(self._session, seen)
         return [f"{said}\nIts picture is not kept (any more)."] if image is None else [said, image]
+
+
+def keep_note(
+    session: Session, text: str, *, pose: Pose, room_id: str | None, stamp_s: float | None = None
+) -> str:
+    """Keep words as an episode; return why they could not be kept, else nothing."""
+    kind, name_map = ObservationKind.NOTE, session.memory.name_map
+    return session.episodes.keep(
+        kind, text=text, pose=pose, room_id=room_id, stamp_s=stamp_s, name_map=name_map
+    ).fault
 
 
 def _require_present_ids(world: WorldModel, words: str) -> None:

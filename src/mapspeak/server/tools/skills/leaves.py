@@ -8,13 +8,12 @@ from functools import partial
 
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import GoalError, LinkError, MapError
-from mapspeak.geometry import Point
-from mapspeak.memory.episodes.observation import ObservationKind
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.robot import GoalState
 from mapspeak.safety import current_caller
 from mapspeak.server.text.world.drives import say_cause
 from mapspeak.server.tools.drive import drive_to_view
+from mapspeak.server.tools.memory import keep_note
 from mapspeak.server.tools.ros.goals import RosAccess
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.session import Session
@@ -116,10 +115,13 @@ class Leaves:
                     found = self.session.drives.is_busy is not value
                 case "in_room" | "near":
                     found = await self._is_at(name, wanted)
-                case "event":
-                    found = self._has_event(value)
-                case _:
-                    found = await self._sees(value)
+                case "event" if (now := self.read_calendar()) is not None:
+                    words, events = value.casefold().split(), self.session.recall_events()
+                    told = [f"{each.text} {each.place}" for each in events if each.is_current(now)]
+                    found = any(all(word in each.casefold() for word in words) for each in told)
+                case "sees" if self.session.robot.description.detector is not None:
+                    seen, label = await self.session.robot.fetch_detections(), value.casefold()
+                    found = any(label in each.label.casefold() for each in seen)
         return found
 
     async def _fetch_battery(self) -> float | None:
@@ -127,7 +129,7 @@ class Leaves:
         if self.session.skilled is not None:
             return await self.session.skilled.fetch_battery()
         inquiry = self.ros.inquiry
-        topics = {} if self.session.ros is None else (await inquiry.fetch_topics()).types
+        topics = (await inquiry.fetch_topics()).types
         if (topic := next((name for name in topics if topics[name] == BATTERY), None)) is None:
             return None
         messages = (await inquiry.hear(topic, BATTERY, wait_s=HEAR_S)).messages
@@ -136,7 +138,8 @@ class Leaves:
 
     async def _is_at(self, name: str, wanted: Arguments) -> bool:
         """Return True where the robot is near a place, or in its room."""
-        here, world = await self._here(), await self.session.fetch_world_model()
+        world = await self.session.fetch_world_model()
+        here = (await self.session.robot.fetch_pose()).pose.point
         within_m: float = wanted.get("within_m", 1.0)
 
         def judge() -> bool:
@@ -147,24 +150,6 @@ class Leaves:
             return room_id is not None and room_id == world.find_room_id(here)
 
         return await self.session.compute(judge)
-
-    def _has_event(self, words: str) -> bool | None:
-        """Return True while an event lasts in whose words these stand."""
-        if (now := self.read_calendar()) is None:
-            return None
-        lasting = (each for each in self.session.recall_events() if each.is_current(now))
-        said = [f"{each.text} {each.place}".casefold() for each in lasting]
-        return any(all(word in each for word in words.casefold().split()) for each in said)
-
-    async def _sees(self, label: str) -> bool | None:
-        if self.session.robot.description.detector is None:
-            return None
-        wanted = label.casefold()
-        found = await self.session.robot.fetch_detections()
-        return any(wanted in each.label.casefold() for each in found)
-
-    async def _here(self) -> Point:
-        return (await self.session.robot.fetch_pose()).pose.point
 
     @_leaf(
         MOVES,
@@ -236,17 +221,8 @@ class Leaves:
         session, text = self.session, given["text"]
         pose = (await session.robot.fetch_pose()).pose
         room_id = await session.find_room_id(pose.point)
-        keep = partial(
-            session.episodes.keep,
-            ObservationKind.NOTE,
-            pose=pose,
-            text=text,
-            stamp_s=self.now_s,
-            room_id=room_id,
-            name_map=session.memory.name_map,
-        )
-        fault = (await session.compute(keep)).fault
-        if fault:
+        keep = partial(keep_note, session, text, pose=pose, room_id=room_id, stamp_s=self.now_s)
+        if fault := await session.compute(keep):
             return SkillOutcome(SkillCode.LOST, quote=fault)
         return SkillOutcome(outputs={"text": text, "room": room_id or ""})
 
