@@ -97,14 +97,15 @@ class SkillBook:
 
     @property
     def taken_names(self) -> set[str]:
-        """The names of all tools."""
-        return {*self._tools, *self.offered}
+        """The names of all tools and skills, and the words of missions."""
+        return {*CONTROL, *self._tools, *self.skills}
 
     def find(self, name: str) -> Skill:
         """Return a skill by its name; SkillError where there is none now."""
         if (found := self.skills.get(name)) is None:
-            hint = say_nearest(name, self.skills).rstrip()
-            hint = hint or f"There are: {', '.join(self.skills)}."
+            hint = (
+                say_nearest(name, self.skills).rstrip() or f"There are: {', '.join(self.skills)}."
+            )
             raise SkillError(f"There is no skill {name[:60]!r}.", hint=hint)
         return found
 
@@ -149,8 +150,7 @@ class SkillBook:
 
     def check_free(self, name: str) -> None:
         """Raise SkillError where a tool, a skill or a word of missions has a mission's name."""
-        others = (self._built_in, self._own, self._owned, self.exposed)
-        if any(name in each for each in (*others, CONTROL, self._tools)):
+        if name in self.taken_names - self.saved.keys():
             raise SkillError(f"{name!r} is taken.", hint="Choose another name.")
 
     def _open(self, entry: OwnersEntry) -> Skill:

@@ -31,8 +31,6 @@ RESERVED = frozenset({"wait_s", "for_s", "robot"})
 """Names that no argument of a tool may have: they are the tool's own."""
 PREFIXES = {Called.PUBLISH: "publish_", Called.READ: "read_"}
 
-_Name = tuple[Called, str]
-
 logger = logging.getLogger(__name__)
 
 
@@ -55,7 +53,7 @@ class Exposure:
     every_s: float = EVERY_S
     kept_s: float = KEPT_S
     _asked_s: float = -math.inf
-    _found: dict[_Name, list[Interface]] = field(default_factory=dict)
+    _found: dict[tuple[Called, str], list[Interface]] = field(default_factory=dict)
     _opened: dict[Interface, Skill | None] = field(default_factory=dict)
 
     async def keep_looking(self) -> None:
@@ -101,11 +99,14 @@ class Exposure:
         """Return an interface as a skill; None where it cannot be, which is told once."""
         base = f"{PREFIXES.get(interface.kind, '')}{interface.name.strip('/')}"
         name = _name_tool(base, taken=self.book.taken_names)
+        ros, command = self.ros.inquiry.connection, interface.command
         try:
             if len(self.book.exposed) >= MOST_EXPOSED:
                 said = f"{MOST_EXPOSED} tools are exposed already."
                 raise LinkError(said, hint="Name fewer of them.")
-            self._check_policy(interface)
+            if isinstance(ros, GuardedConnection) and command and ros.is_name_denied(command):
+                said = "The policy denies it."
+                raise PolicyError(said, hint="A person can allow it in policy.yaml.")
             skill = await self.book.open_interface(interface, name=name, reserved=RESERVED)
         except MapspeakError as error:
             if interface not in self._opened:
@@ -114,32 +115,24 @@ class Exposure:
         self.book.exposed[name] = skill
         return skill
 
-    def _check_policy(self, interface: Interface) -> None:
-        """Refuse an interface that the policy denies for its name: a tool would be of no use."""
-        connection, command = self.ros.inquiry.connection, interface.command
-        if command is None or not isinstance(connection, GuardedConnection):
-            return
-        if connection.is_name_denied(command):
-            raise PolicyError("The policy denies it.", hint="A person can allow it in policy.yaml.")
-
-    async def _list_named(self) -> dict[_Name, str]:
+    async def _list_named(self) -> dict[tuple[Called, str], str]:
         """Return what the robot offers now of the requested names, with the types of topics."""
         connection = self.ros.inquiry.connection
         graph, offered = await connection.fetch_graph(), await connection.fetch_services()
         actions = actions_of(graph)
         parts = {f"{action}/{part}" for action in actions for part in PARTS_OF_ACTION}
-        topics = (each for each in sorted(graph.types) if each not in parts)
-        services = (each for each in offered if each in self.patterns or find_folded(each) is None)
+        topics = (each for each in sorted(graph.types) if "/_action/" not in each)
+        services = (each for each in offered if find_folded(each) is None)
         types = {
             **{(Called.ACTION, name): "" for name in actions},
-            **{(Called.SERVICE, name): "" for name in services},
-            **{(Called.READ, name): graph.types[name] for name in topics},
+            **{(Called.SERVICE, name): "" for name in services if "/_action/" not in name},
+            **{(Called.SERVICE, name): "" for name in offered if name in self.patterns},
+            **{(Called.READ, name): graph.types[name] for name in topics if name not in parts},
         }
         return {
-            (called, name): kind
-            for (called, name), kind in types.items()
-            if "/_action/" not in name or (called is Called.SERVICE and name in self.patterns)
-            if any(fnmatch.fnmatchcase(name, pattern) for pattern in self.patterns)
+            key: kind
+            for key, kind in types.items()
+            if any(fnmatch.fnmatchcase(key[1], pattern) for pattern in self.patterns)
         }
 
     async def _fetch(self, called: Called, name: str, kind: str) -> list[Interface]:
@@ -151,14 +144,12 @@ class Exposure:
                 Called.PUBLISH: await fetch_subscribers(inquiry.connection, name),
             }
             return [Interface(side, name, bare_type(kind)) for side in ends if ends[side].others]
-        is_action, connection = called is Called.ACTION, inquiry.connection
-        fetch = inquiry.fetch_action_type if is_action else connection.fetch_service_type
+        fetch = inquiry.fetch_action_type if called is Called.ACTION else inquiry.fetch_service_type
         return [Interface(called, name, bare_type(await fetch(name)))]
 
 
 def _name_tool(name: str, *, taken: Collection[str]) -> str:
     """Return what a name of ROS is called as a tool, like no other tool."""
-    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()[-MOST_NAME:].strip("_")
-    base = plain or "skill"
+    base = re.sub(r"\W+", "_", name, flags=re.ASCII).lower()[-MOST_NAME:].strip("_") or "skill"
     others = (f"robot_{base}{end}" for end in ("", *(f"_{n}" for n in range(2, 1000))))
     return next(each for each in (base, *others) if each not in taken)

