@@ -47,7 +47,6 @@ COMPARING = {
     "below": parameter("number", description="of the value"),
 }
 CONDITIONS = {**OF_FACTS, **COMPARING}
-TIMES = frozenset({"time_from", "time_until"})
 MODIFIERS = frozenset({"not", "within_m", "within_s"})
 LOOKS_S = (0.05, 0.25)
 """The shortest and longest wall time between two looks at the robot's clock."""
@@ -89,7 +88,7 @@ async def find_unmet(wanted: Arguments, facts: Facts) -> dict[str, JsonValue]:
         )
     is_opposite = wanted.get("not", False)
     for name, value in named.items():
-        if name in TIMES:
+        if name.startswith("time_"):
             holds = _is_time(wanted, facts.read_calendar())
         elif name not in COMPARING:
             holds = await facts.holds(name, wanted)
@@ -147,14 +146,14 @@ class SkillGate:
         its own only if a person must approve it.
         """
         spec = skill.spec
-        is_free = spec.effect is SkillEffect.READS or is_through_guard
+        reads = spec.effect is SkillEffect.READS
+        is_free = (reads or is_through_guard) and not spec.is_always_asked
 
         async def run(arguments: Arguments, on_progress: OnProgress) -> SkillOutcome:
             given = check_arguments(spec.parameters, arguments, skill=spec.name)
-            needs_word = spec.is_always_asked
-            command = RunSkill(skill=spec.name, arguments=given, needs_word=needs_word)
-            asked = None if is_free and not needs_word else command
-            return await self.run_once(spec, partial(skill.run, given, on_progress), command=asked)
+            command = RunSkill(skill=spec.name, arguments=given, needs_word=spec.is_always_asked)
+            work = partial(skill.run, given, on_progress)
+            return await self.run_once(spec, work, command=None if is_free else command)
 
         return Skill(spec, run)
 

@@ -37,15 +37,13 @@ class Question:
     """A question that waits.
 
     Attributes:
-        given: The arguments of the leaf that asks it.
+        given: The arguments of the leaf that asks it, with the latest picture where it names none.
         client: The session that may answer it, as long as it is there; empty for anyone.
-        picture_id: Of its subject, such as "P3"; that of the latest picture where none is given.
     """
 
     id: str
     given: Arguments
     client: str
-    picture_id: str
     picture: CameraPicture | None
     answer: str | None = None
     is_answered: anyio.Event = field(default_factory=anyio.Event)
@@ -75,13 +73,12 @@ class QuestionBook:
     def put(self, given: Arguments, *, client: str) -> Question:
         """Return the question of a leaf, which waits from now on."""
         self._n_asked += 1
-        picture_id = given.get("picture", next(reversed(self.pictures), ""))
+        given = {"picture": next(reversed(self.pictures), ""), **given}
         question = Question(
             id=f"Q{self._n_asked}",
             given=given,
             client=client,
-            picture_id=picture_id,
-            picture=self.pictures.get(picture_id),
+            picture=self.pictures.get(given["picture"]),
         )
         self.waiting[question.id] = question
         return question
@@ -91,12 +88,8 @@ class QuestionBook:
 
         A person, whose client is None, may answer every one. SkillError where none waits.
         """
-        open_to = {"", client, *self.gone}
-        mine = {
-            each.id: each
-            for each in self.waiting.values()
-            if client is None or each.client in open_to
-        }
+        asked, open_to = self.waiting.values(), {"", client, *self.gone}
+        mine = {each.id: each for each in asked if client is None or each.client in open_to}
         if not mine and self.waiting:
             hint = "Only the client that runs the mission answers it."
             raise SkillError("No mission waits for an answer of yours.", hint=hint)
@@ -151,7 +144,7 @@ class SkillRun:
     _why: SkillCode = SkillCode.CANCELLED
 
     def __post_init__(self) -> None:
-        self._begun_s, self._n_stops = self.runs.read_clock_s(), self.runs.count_stops()
+        self._begun_s, self.n_stops = self.runs.read_clock_s(), self.runs.count_stops()
 
     @property
     def is_over(self) -> bool:
@@ -170,12 +163,6 @@ class SkillRun:
         """True while it waits for an answer; missions alone ask, one at a time."""
         asks = isinstance(self.skill, Mission) and bool(self.runs.questions.waiting)
         return asks and not self.is_over
-
-    @property
-    def is_stopped(self) -> bool:
-        """True where a stop of the robot since it began is to end it."""
-        does = self.skill.spec.effect is not SkillEffect.READS
-        return does and self._n_stops != self.runs.count_stops()
 
     @property
     def passed_s(self) -> float:
@@ -265,7 +252,8 @@ class SkillRuns:
         while True:
             await anyio.sleep(LOOK_S)
             for run in self.under_way:
-                if run.is_stopped:
+                does = run.skill.spec.effect is not SkillEffect.READS
+                if does and run.n_stops != self.count_stops():
                     run.give_up(SkillCode.STOPPED)
 
     async def begin(

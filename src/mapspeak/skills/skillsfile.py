@@ -92,7 +92,11 @@ class _Argument(_Written):
     @property
     def takes(self) -> Schema:
         """What its value may be; of a list and a text `least` and `most` are counts."""
-        kind = _KINDS.get(self.kind, self.kind) if self.kind else self._guess()
+        # Where no kind is said, its default, its choices or its bounds show it.
+        shown = self.default if self.default is not None else next(iter(self.choices), None)
+        is_number = (self.least, self.most, self.unit) != (None, None, "")
+        guess = _SHOWN.get(type(shown), "number" if is_number else "string")
+        kind = _KINDS.get(self.kind, self.kind) if self.kind else guess
         is_count, bounds = kind in ("string", "array"), (self.least, self.most)
         limits = (int(each) if is_count and each is not None else each for each in bounds)
         return parameter(
@@ -104,12 +108,6 @@ class _Argument(_Written):
             default=self.default,
             required=self.default is None,
         )
-
-    def _guess(self) -> str:
-        """Return the kind that its bounds, its default or its choices show."""
-        shown = self.default if self.default is not None else next(iter(self.choices), None)
-        is_number = (self.least, self.most, self.unit) != (None, None, "")
-        return _SHOWN.get(type(shown), "number" if is_number else "string")
 
 
 def _checked(parameters: Mapping[str, Schema]) -> AfterValidator:
@@ -190,11 +188,10 @@ class OwnersEntry(_Written):
     @cached_property
     def spec(self) -> SkillSpec:
         """Its description as a skill."""
-        effect = self.effect or _EFFECTS.get(self.calls, SkillEffect.CHANGES)
         return SkillSpec(
             self.name,
             self.sentence,
-            SkillEffect(effect),
+            SkillEffect(self.effect or _EFFECTS.get(self.calls, SkillEffect.CHANGES)),
             timeout_s=self.within_min * 60 if self.mission is not None else self.timeout_s,
             parameters={each.name: each.takes for each in self.arguments},
             needs=self.needs,

@@ -176,9 +176,9 @@ def _read_leaf(written: Mapping[str, Any], number: int) -> Step:
     named = {str(key): _plain(written[key]) for key in others if key != "as"}
     if isinstance(given, Mapping):
         named, given = {**given, **named}, None
-    leaf = Step(kind=StepKind.LEAF, number=number, skill=_name(first, written))
-    output = _name(output, written) if output else ""
-    return replace(leaf, main=given, arguments=named, output=output)
+    skill = _name(first, written)
+    leaf = Step(kind=StepKind.LEAF, number=number, skill=skill, main=given, arguments=named)
+    return replace(leaf, output=_name(output, written)) if output else leaf
 
 
 def _plain(value: object) -> JsonValue:

@@ -17,7 +17,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.arguments import say_wanted
 from mapspeak.skills.missions import Interrupted, MissionBounds
-from mapspeak.skills.runs import Question, QuestionBook, SkillRun
+from mapspeak.skills.runs import Question, SkillRun
 from mapspeak.skills.steps import Mission, Step, StepKind
 
 MOST_SENTENCE = 300
@@ -43,6 +43,7 @@ CODES = {
     SkillCode.PRECONDITION: "It was not begun.",
     SkillCode.NOT_ACHIEVED: "It ended, but its condition of success did not hold.",
 }
+ANSWERS = "{answer_mission} answers it."
 GOES_ON = "It goes on. {skill_status} waits for it. {cancel_skill} ends it."
 HEADS = {
     StepKind.SEQUENCE: "one after the other",
@@ -159,7 +160,9 @@ def say_run(run: SkillRun, steps_told: Sequence[str] = ()) -> str:
     else:
         if told.values:
             parts.append(f"latest progress of {run.n_progress}:\n{show_message(told.values)}")
-        parts += [say_waiting(run.runs.questions) if run.is_asking else "", lead(GOES_ON)]
+        if run.is_asking:
+            parts += [*map(say_question, run.runs.questions.waiting.values()), lead(ANSWERS)]
+        parts.append(lead(GOES_ON))
     return cut("\n".join(filter(None, parts)))
 
 
@@ -189,16 +192,10 @@ def say_question(question: Question) -> str:
     given = question.given
     answers, fallback = given.get("answers"), given.get("otherwise")
     taken = f" Answers: {', '.join(map(_say_value, answers))}." if answers else ""
-    about = "" if question.picture is None else f" About picture {question.picture_id}."
+    about = "" if question.picture is None else f" About picture {given['picture']}."
     ends = "the step fails" if fallback is None else f"it is {_say_value(fallback)}"
     waits = f" It waits {given['within_s']:g} s; without an answer {ends}."
     return f"{question.id}: {quote(given['question'], most=MOST_SENTENCE)}.{taken}{waits}{about}"
-
-
-def say_waiting(questions: QuestionBook) -> str:
-    """Return the questions that wait, with how they are answered."""
-    asked = [say_question(each) for each in questions.waiting.values()]
-    return "\n".join([*asked, lead("{answer_mission} answers it.")]) if asked else ""
 
 
 def say_skills(skills: Iterable[Skill]) -> str:
@@ -208,9 +205,8 @@ def say_skills(skills: Iterable[Skill]) -> str:
         said = f": {quote(spec.description, most=120)}" if spec.description else ""
         takes = ", ".join(spec.parameters) or "nothing"
         lines.append(f"- {spec.name}({takes}), {spec.effect}{said}")
-    shown = lines[:MOST_SKILLS]
-    rest = f"\nand {len(lines) - MOST_SKILLS} more." if len(lines) > MOST_SKILLS else ""
-    return "Skills:\n" + "\n".join(shown) + rest
+    rest = f"and {len(lines) - MOST_SKILLS} more." if len(lines) > MOST_SKILLS else ""
+    return "\n".join(filter(None, ["Skills:", *lines[:MOST_SKILLS], rest]))
 
 
 def say_interrupted(interrupted: Iterable[Interrupted]) -> str:

@@ -41,7 +41,7 @@ from mapspeak.skills.skillsfile import (
     set_aside,
     write_skills,
 )
-from mapspeak.skills.steps import Mission, StepKind, fill_in, find_names, parse_tree
+from mapspeak.skills.steps import Mission, fill_in, find_names, parse_tree
 from mapspeak.worldmodel.model import WorldModel
 
 MOST_ARGUMENTS = 20
@@ -105,8 +105,7 @@ class SkillRunTools:
         """Cancel a run of a skill; nothing of it goes on at the robot then."""
         found = self._runs.find(run)
         if found.is_over:
-            over = "It was over already, nothing was cancelled."
-            return f"{over}\n{say_run(found)}"
+            return f"It was over already, nothing was cancelled.\n{say_run(found)}"
         await found.cancel()
         return say_run(found)
 
@@ -154,7 +153,6 @@ class MissionTools:
 
     def __init__(self, book: SkillBook) -> None:
         self._book = book
-        self._runs = book.runs
 
     @tool(
         "Run a mission",
@@ -192,7 +190,8 @@ class MissionTools:
             mission = self._find_saved(name)
         given = check_arguments(mission.spec.parameters, values or {}, skill=mission.spec.name)
         bounds = await self._check(mission, given)
-        run = await self._runs.begin(mission, given, wait_s=wait_s, on_news=tell_news(context))
+        told = tell_news(context)
+        run = await self._book.runs.begin(mission, given, wait_s=wait_s, on_news=told)
         return f"{say_bounds(mission, bounds)}\n{say_run(run)}"
 
     @tool("Answer a mission", ToolEffect.REMEMBERS)
@@ -203,9 +202,9 @@ class MissionTools:
 
         Look at the picture before you answer; where you cannot tell, leave it to the fallback.
         """
-        found = self._runs.questions.find(question, client=current_caller().session)
+        found = self._book.runs.questions.find(question, client=current_caller().session)
         if answer is not None:
-            taken = self._runs.questions.answer(found, answer)
+            taken = self._book.runs.questions.answer(found, answer)
             return [f"{found.id} is answered: {taken}."]
         shown: list[str | Image] = [say_question(found)]
         if found.picture is not None:
@@ -234,29 +233,28 @@ class MissionTools:
                 raise SkillError("Nothing is to be saved.", hint="Give a tree, or a correction.")
             add_correction(path, name, correction)
             told = "Its steps are as before: save a tree that does it, where one can."
-        else:
-            book.load_saved()
-            book.check_free(name)
-            before = book.saved.get(name)
-            kept = () if before is None else before.remember
-            sentence = sentence or ("" if before is None else before.spec.description)
-            written = {
-                "name": name,
-                "sentence": sentence,
-                "arguments": [
-                    {"name": each, "kind": "text", "most": 200.0}
-                    | ({} if default is None else {"default": default})
-                    for each, default in (parameters or {}).items()
-                ],
-                "within_min": within_min,
-                "remember": [*kept, *([correction] if correction else [])],
-            }
-            await self._check(self._open(written, tree), {})
-            self._check_file(path := book.folder / f"{name}.yaml", name)
-            filled = {key: each for key, each in written.items() if each not in ("", [])}
-            write_skills(path, {"skills": [filled]})
-            told = ""
-        return "\n".join(filter(None, (f"Saved {name} in {path}.", told, self._show(name))))
+            return f"Saved {name} in {path}.\n{told}\n{self._show(name)}"
+        book.load_saved()
+        book.check_free(name)
+        before = book.saved.get(name)
+        kept = () if before is None else before.remember
+        sentence = sentence or ("" if before is None else before.spec.description)
+        written = {
+            "name": name,
+            "sentence": sentence,
+            "arguments": [
+                {"name": each, "kind": "text", "most": 200.0}
+                | ({} if default is None else {"default": default})
+                for each, default in (parameters or {}).items()
+            ],
+            "within_min": within_min,
+            "remember": [*kept, *([correction] if correction else [])],
+        }
+        await self._check(self._open(written, tree), {})
+        self._check_file(path := book.folder / f"{name}.yaml", name)
+        filled = {key: each for key, each in written.items() if each not in ("", [])}
+        write_skills(path, {"skills": [filled]})
+        return f"Saved {name} in {path}.\n{self._show(name)}"
 
     @tool("Show missions and skills", ToolEffect.READS)
     async def show_missions(self, name: SavedName = None) -> str:
@@ -292,9 +290,7 @@ class MissionTools:
         return bounds
 
     def _check_places(self, world: WorldModel, mission: Mission, given: Arguments) -> None:
-        for step in mission.tree.walk():
-            if step.kind is not StepKind.LEAF:
-                continue
+        for step in (each for each in mission.tree.walk() if each.skill):
             if step.skill not in BUILT_IN:
                 # What the robot's own skills do is not known: they may learn places.
                 return
