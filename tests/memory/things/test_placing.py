@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drawing import grid_from_text
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.things.finding import find_things
 from mapspeak.memory.things.thing import Thing
@@ -158,27 +158,52 @@ def test_a_range_that_fits_nothing_in_sight_leaves_the_direction_its_say() -> No
     assert chair.position.x > 2.0
 
 
-BEARINGS = st.floats(-math.pi, math.pi)
-SPOTS = st.tuples(st.floats(0.6, 11.5), st.floats(0.6, 1.6))
-
-
-@given(first=SPOTS, second=SPOTS, one=BEARINGS, other=BEARINGS)
-def test_a_second_view_of_a_thing_never_enlarges_its_radius(
-    first: tuple[float, float], second: tuple[float, float], one: float, other: float
-) -> None:
-    grid = grid_from_text(WITH_A_TABLE, resolution_m=0.25)
-    places = [
+@pytest.mark.parametrize("at_x", [5.0, 7.0, 9.0])
+def test_what_two_looks_down_a_corridor_have_between_them_is_placed_there(at_x: float) -> None:
+    long_wall = [*["#" * 80], *["#" + "." * 78 + "#"] * 8, *["#" * 80]]
+    grid = grid_from_text("\n".join(long_wall), resolution_m=0.25)
+    looks = tuple(
         Waypoint(
             name=name,
-            pose=Pose(*spot, 0.0),
-            functional_landmarks=(
-                Landmark(label="chair", bearing_rad=bearing, bearing_from="picture"),
+            pose=Pose(at_x + ahead_m, 0.5, 0.0),
+            safety_landmarks=(
+                Landmark(
+                    label="fire extinguisher",
+                    bearing_rad=math.atan2(-0.25, -ahead_m),
+                    bearing_from="picture",
+                ),
             ),
         )
-        for name, spot, bearing in (("a", first, one), ("b", second, other))
-    ]
-    (alone,) = find_things(SemanticMap(waypoints=(places[0],)), grid).things
-    both = find_things(SemanticMap(waypoints=tuple(places)), grid).things
+        for name, ahead_m in (("a", -3.0), ("b", 4.5))
+    )
+
+    (thing,) = find_things(SemanticMap(waypoints=looks), grid).things
+
+    assert thing.position is not None
+    assert thing.position.x == pytest.approx(at_x, abs=0.6)
+    assert all(view.off_rad is not None and view.off_rad < 0.1 for view in thing.supporting)
+
+
+BEARINGS = st.floats(-math.pi, math.pi)
+SPOTS = st.tuples(st.floats(0.6, 11.5), st.floats(0.6, 1.6))
+A_LITTLE = st.floats(-math.radians(3), math.radians(3))
+
+
+@given(first=SPOTS, second=SPOTS, one=BEARINGS, off_rad=A_LITTLE)
+def test_a_second_view_that_points_at_a_thing_never_enlarges_its_radius(
+    first: tuple[float, float], second: tuple[float, float], one: float, off_rad: float
+) -> None:
+    grid = grid_from_text(WITH_A_TABLE, resolution_m=0.25)
+
+    def look(name: str, spot: tuple[float, float], bearing: float) -> Waypoint:
+        mark = Landmark(label="chair", bearing_rad=bearing, bearing_from="picture")
+        return Waypoint(name=name, pose=Pose(*spot, 0.0), functional_landmarks=(mark,))
+
+    seen = look("a", first, one)
+    (alone,) = find_things(SemanticMap(waypoints=(seen,)), grid).things
+    assert alone.position is not None
+    again = look("b", second, Point(*second).bearing_to(alone.position) + off_rad)
+    both = find_things(SemanticMap(waypoints=(seen, again)), grid).things
 
     (now,) = (thing for thing in both if "a" in thing.waypoints)
     assert now.uncertainty_m is not None

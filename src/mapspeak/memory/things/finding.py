@@ -19,13 +19,13 @@ from mapspeak.memory.things.placing import (
     find_confidence_ratio,
     measure_agreement,
     place,
+    speaks_of,
     trust_range,
     views_from_apart,
 )
 from mapspeak.memory.things.sight import (
-    BODY_M,
-    LATTICE_M,
     N_RAYS,
+    SURFACE_M,
     SightMap,
     are_opposite,
     bearing_index,
@@ -39,8 +39,6 @@ from mapspeak.spatial.grid import FloatArray
 
 PLAIN_SIGHT_M = 5.0
 """Who stands no farther and has nothing between would see a thing."""
-SURFACE_M = BODY_M + LATTICE_M / math.sqrt(2)
-"""A thing's surface is met at most so far before the middle of a lattice cell that it may be in."""
 LIKELY_RATIO = 0.5
 ELSEWHERE_RAD = math.radians(30)
 """A view that points so far past a thing says that it is elsewhere."""
@@ -252,12 +250,16 @@ def _join(sight: SightMap, views: Sequence[WeighedView]) -> tuple[Located, ...]:
 
 
 def _place(posteriors: Posteriors, group: Group) -> Placement:
-    """Place a thing by all its views, or by the surest of two directions that hardly agree."""
+    """Place a thing by all its views, or by the surer of two directions that hardly agree.
+
+    That one stands for both only where the other speaks of the place as well.
+    """
     together = _place_by(posteriors, group)
     if len(group) != 2 or any(each.landmark.range_m is not None for each in group):
         return together
-    alone = (_place_by(posteriors, [each]) for each in group)
-    return min((together, *alone), key=lambda each: each.uncertainty_m)
+    alone = [(_place_by(posteriors, [one]), other) for one, other in (group, group[::-1])]
+    borne_out = (at for at, other in alone if speaks_of(posteriors.sight, other, at.position))
+    return min((together, *borne_out), key=lambda each: each.uncertainty_m)
 
 
 def _place_by(posteriors: Posteriors, group: Group) -> Placement:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.memory.things.likelihood import ViewLikelihood, WeighedView
-from mapspeak.memory.things.sight import BODY_M, SightMap, find_log_priors
+from mapspeak.memory.things.sight import BODY_M, SURFACE_M, SightMap, find_log_priors
 from mapspeak.memory.things.thing import NOISE
 from mapspeak.spatial.grid import FloatArray, IntArray
 
@@ -143,6 +143,14 @@ def likelihood_of(view: WeighedView) -> ViewLikelihood:
     """Return where a view that says so has its thing."""
     assert view.likelihood is not None, "joined views say where"  # noqa: S101 - our belief
     return view.likelihood
+
+
+def speaks_of(sight: SightMap, view: WeighedView, point: Point) -> bool:
+    """Return True where a view may be of a thing at a point."""
+    rows, cols = sight.rows.ravel()[view.spoken_of], sight.cols.ravel()[view.spoken_of]
+    row, col = sight.grid.fractional_cells_at(np.array([[point.x, point.y]]))[0]
+    off_m = np.hypot(rows - row, cols - col) * sight.grid.resolution_m
+    return bool((off_m <= SURFACE_M).any())
 
 
 def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:

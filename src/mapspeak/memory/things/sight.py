@@ -38,6 +38,8 @@ HIDDEN_M = 1.0
 """Of a wall, furniture on both sides hides no longer piece."""
 BODY_M = 0.3
 """A thing's middle lies up to so far behind the surface that the robot has met."""
+SURFACE_M = BODY_M + LATTICE_M / math.sqrt(2)
+"""A thing's surface is met at most so far before the middle of a lattice cell that it may be in."""
 OWN_M = 0.2
 """The robot's own place is no obstacle, even where the map has one by now."""
 
