@@ -1,6 +1,7 @@
 """Things that are kept beside a large memory, and what becomes of them in a later session."""
 
 import pickle
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,8 +18,10 @@ from mapspeak.worldmodel.recollection import (
     KEPT_FROM,
     THINGS_FILE,
     KeptMemory,
+    Recollection,
     Recollector,
 )
+from mapspeak.worldmodel.thingids import IDS_FILE
 
 HALL = """
     ####################
@@ -122,7 +125,7 @@ def test_what_changed_since_is_joined_anew(tmp_path: Path) -> None:
 
 def test_the_things_of_a_small_memory_are_joined_and_not_kept(tmp_path: Path) -> None:
     _keep(tmp_path, _remember(3))
-    assert not list(tmp_path.iterdir())
+    assert not (tmp_path / THINGS_FILE).exists()
 
 
 def _prepare(folder: Path, memory: SemanticMap, embedder: ConceptEmbedder) -> Recollector:
@@ -153,7 +156,10 @@ def test_a_kept_index_answers_as_a_new_one_does_when_places_came_and_went(tmp_pa
     changed = SemanticMap(waypoints=(*places[3:40], *places[41:]))
 
     later = _prepare(tmp_path, changed, ConceptEmbedder()).latest
-    new = Recollector(ConceptEmbedder).recollect(changed, _draw())
+    (tmp_path / "no index").mkdir()
+    shutil.copy(tmp_path / IDS_FILE, tmp_path / "no index")
+    kept = tmp_path / "no index"
+    new = Recollector(ConceptEmbedder, kept=kept).recollect(changed, _draw())
 
     assert later is not None
     for words in ("sink 2", "sink 40", "sink 501", "somewhere to wash", "place 499", "ladder"):
@@ -206,3 +212,21 @@ def test_a_file_that_names_a_function_is_not_obeyed(name: str) -> None:
 def test_things_that_cannot_be_kept_are_used_all_the_same(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert _keep(tmp_path / "file", _remember()).latest is not None
+
+
+def test_sessions_that_share_a_memory_give_no_id_to_two_things(tmp_path: Path) -> None:
+    one, other = Recollector(kept=tmp_path), Recollector(kept=tmp_path)
+    one.recollect(_remember(2), _draw())
+    with (tmp_path / IDS_FILE).open("a") as log:
+        log.write("[7, half a line")
+    first = other.recollect(_remember(3), _draw())
+    second = one.recollect(_remember(4), _draw())
+    again = other.recollect(_remember(4), _draw())
+
+    assert _ids(first).items() < _ids(second).items()
+    assert _ids(again) == _ids(second)
+    assert sorted(_ids(again).values()) == [f"T{number}" for number in range(1, 9)]
+
+
+def _ids(recollection: Recollection) -> dict[str, str]:
+    return {each.thing.label: each.id for each in recollection.things}

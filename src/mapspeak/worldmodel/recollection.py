@@ -32,6 +32,7 @@ from mapspeak.worldmodel.remembered import (
     number_things,
 )
 from mapspeak.worldmodel.reported import ReportJoiner
+from mapspeak.worldmodel.thingids import IDS_FILE, ThingIds, ViewKeys
 
 logger = logging.getLogger(__name__)
 
@@ -99,7 +100,7 @@ class Recollection:
     Args:
         places: The records under their ids.
         things: The things of these under their ids, in the order of these.
-        n_named: How many ids were ever given.
+        ids: The numbers that views bear.
         unseen: What looks say of the things that they do not name.
         search: Answers questions.
     """
@@ -112,7 +113,7 @@ class Recollection:
         *,
         places: Sequence[RememberedPlace],
         things: Sequence[RememberedThing],
-        n_named: int,
+        ids: ThingIds,
         unseen: UnseenThings,
         search: Search,
     ) -> None:
@@ -121,7 +122,7 @@ class Recollection:
         self.found = found
         self.places = tuple(places)
         self.things = tuple(things)
-        self.n_named = n_named
+        self.ids = ids
         self.unseen = unseen
         self._search = search
         self._around: dict[tuple[Point, float], FloatArray] = {}
@@ -165,6 +166,12 @@ class Recollection:
         """Return the thing with that id, or None."""
         found = self.by_id.get(thing_id)
         return found if isinstance(found, RememberedThing) else None
+
+    def find_became(self, thing_id: str) -> RememberedThing | None:
+        """Return the thing that has most views of one whose id is gone; None where none has any."""
+        keys = ViewKeys(self.memory.waypoints)
+        shared = [self.ids.count_bearing(thing_id, keys.of(each.thing)) for each in self.things]
+        return self.things[shared.index(max(shared))] if any(shared) else None
 
     def find_around(self, point: Point, reach_m: float) -> FloatArray:
         """Return where things are, one at the point itself too, within reach; shape (n, 2)."""
@@ -232,6 +239,7 @@ class Recollector:
         self._earlier: KeptMemory | None = None
         self._contents = Contents()
         self._search = Search(self._find_vectors, kept=kept and kept / INDEX_FILE)
+        self._ids = ThingIds(kept and kept / IDS_FILE)
         self.reports = ReportJoiner()
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
@@ -338,18 +346,14 @@ class Recollector:
         known = earlier.found if earlier else self._take_kept(memory)
         found = find_things(memory, grid, earlier=known)
         self._n_new += found.n_joined
-        things, n_named = number_things(
-            found.things,
-            () if earlier is None else earlier.things,
-            n_named=0 if earlier is None else earlier.n_named,
-        )
+        before, keys = earlier.things if earlier else (), ViewKeys(memory.waypoints)
         return Recollection(
             memory,
             grid,
             found,
             places=number_places(memory.waypoints, () if earlier is None else earlier.places),
-            things=things,
-            n_named=n_named,
+            things=number_things(found.things, before, self._ids, keys),
+            ids=self._ids,
             unseen=UnseenThings(memory, found, earlier=None if earlier is None else earlier.unseen),
             search=self._search,
         )

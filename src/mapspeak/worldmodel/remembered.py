@@ -1,6 +1,7 @@
 """Remembered places and things under ids that stay while these do, and how far to trust them."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import chain, repeat
@@ -12,6 +13,7 @@ from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_tru
 from mapspeak.memory.things.labels import name_the_same
 from mapspeak.memory.things.thing import Thing
 from mapspeak.spatial.rooms.identity import match_best_first
+from mapspeak.worldmodel.thingids import ThingIds, ViewKeys
 
 SAME_THING_M = 1.0
 """A thing of the same name within this distance of an earlier one is that one, seen better."""
@@ -79,15 +81,18 @@ def _place_id(number: int) -> str:
 
 
 def number_things(
-    things: Sequence[Thing], earlier: Sequence[RememberedThing], *, n_named: int
-) -> tuple[tuple[RememberedThing, ...], int]:
-    """Return things under the ids that they had before, and new things under new ones.
+    things: Sequence[Thing], earlier: Sequence[RememberedThing], ids: ThingIds, keys: ViewKeys
+) -> tuple[RememberedThing, ...]:
+    """Return things under the ids that their views bear, and new things under new ones.
+
+    A thing has the id that most of its views bear; of two that would have one id, it stays with the
+    one that has more of the views. A thing that is gone leaves its id unused.
 
     Args:
-        n_named: How many ids were ever given; a thing that is gone leaves its id unused.
+        earlier: The things of before, in this session.
 
     Returns:
-        The things in the order of their ids, and how many ids were ever given.
+        The things in the order of their ids.
     """
     # By identity first: that is most of them, and to compare them as values is slow.
     present, known = set(map(id, things)), {id(each.thing) for each in earlier}
@@ -99,18 +104,56 @@ def number_things(
         named |= {same[id(t)].id: replace(same[id(t)], thing=t) for t in new if id(t) in same}
         new = [thing for thing in new if id(thing) not in same]
     named |= dict.fromkeys(each.id for each in left.values())
-    seen_better = match_best_first(
-        ((rank, number), each.id, number)
-        for number, thing in enumerate(new)
-        for each in left.values()
-        if (rank := _sameness(thing, each.thing)) is not None
-    )
-    for number, thing in enumerate(new):
-        if number not in seen_better:
-            n_named += 1
-        id_ = seen_better.get(number, f"T{n_named}")
-        named[id_] = RememberedThing(id=id_, thing=thing)
-    return tuple(each for each in named.values() if each is not None), n_named
+    if new:
+        taken = {_number_of(id_) for id_, each in named.items() if each is not None}
+        for number, thing in zip(_give_numbers(new, left, taken, ids, keys), new, strict=True):
+            named[f"T{number}"] = RememberedThing(id=f"T{number}", thing=thing)
+    things_left = (each for each in named.values() if each is not None)
+    return tuple(sorted(things_left, key=lambda each: _number_of(each.id)))
+
+
+def _number_of(thing_id: str) -> int:
+    return int(thing_id.removeprefix("T"))
+
+
+def _give_numbers(
+    new: Sequence[Thing],
+    left: Mapping[Thing, RememberedThing],
+    taken: Collection[int],
+    ids: ThingIds,
+    keys: ViewKeys,
+) -> list[int]:
+    """Return the number of each new thing: what its views bear, else that of a thing it continues.
+
+    Args:
+        left: Things of before that are there no longer as they were.
+        taken: The numbers of all other things.
+    """
+    views = [keys.of(thing) for thing in new]
+    with ids.giving() as given:
+        borne = [Counter(ids.numbers.get(key) for key in each) for each in views]
+        found = match_best_first(
+            # Most views first, then least of other things.
+            ((-n_shared, counts.total() - n_shared, old), old, number)
+            for number, counts in enumerate(borne)
+            for old, n_shared in counts.items()
+            if old is not None and old not in taken
+        )
+        claimed = {*taken, *found.values()}
+        found |= match_best_first(
+            ((rank, number), old, number)
+            for number, thing in enumerate(new)
+            if number not in found
+            for former, each in left.items()
+            if (old := _number_of(each.id)) not in claimed
+            and (rank := _sameness(thing, former)) is not None
+        )
+        numbers = [found[n] if n in found else ids.new() for n in range(len(new))]
+        for number, counts, each in zip(numbers, borne, views, strict=True):
+            # Views of a thing that has parted bear its own number from now on.
+            is_known = number in counts
+            given |= {key: number for key in each if not is_known or key not in ids.numbers}
+    return numbers
 
 
 def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:

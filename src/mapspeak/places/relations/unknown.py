@@ -24,8 +24,19 @@ OF_THE_MAP = pattern(rf"\b(?:{KINDS[Kind.DOOR]}|{KINDS[Kind.CORRIDOR]}|frontier)
 def no_such_place(world: WorldModel, words: str) -> GoalError:
     """Return the error for words that name no place: what became of it, and what there is."""
     wanted = words.strip()
+    became = _find_became(world, wanted)
+    if became is not None:
+        return GoalError(f"{wanted.upper()} is {became} now.", hint=f"Use {became}.")
     hint, step = _known_places(world, wanted)
     return GoalError(_what_became_of(world, wanted), hint=hint, step=step)
+
+
+def _find_became(world: WorldModel, wanted: str) -> str | None:
+    """Return the id of the thing that another one was joined with."""
+    match = ID.fullmatch(wanted)
+    is_thing = match is not None and world.recollection.ids.has_given(wanted.upper())
+    found = world.recollection.find_became(wanted.upper()) if is_thing else None
+    return None if found is None else found.id
 
 
 def _what_became_of(world: WorldModel, place: str) -> str:
@@ -38,7 +49,7 @@ def _what_became_of(world: WorldModel, place: str) -> str:
     letter, number = (match["letter"].upper(), int(match["number"])) if match else ("", 0)
     if letter == "F" and 1 <= number <= world.frontiers.n_named:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
-    if letter == "T" and 1 <= number <= world.recollection.n_named:
+    if letter == "T" and world.recollection.ids.has_given(place.upper()):
         return f"The thing {place.upper()} is no longer remembered."
     if find_elsewhere(world.memory, place):
         return f"{place[:80]!r} is remembered on another map; where that lies is not known here."
