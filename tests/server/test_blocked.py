@@ -68,6 +68,23 @@ async def test_a_closure_is_told_with_its_end_and_with_what_it_cuts_off(tmp_path
     assert 'W1 "bench": every known way' in text
 
 
+async def test_a_remembered_place_that_the_map_does_not_show_yet_is_not_in_the_way(
+    tmp_path: Path,
+) -> None:
+    grid = two_rooms()
+    robot = FakeRobot(grid)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        far = {"name": "attic", "description": "", "x": 6.0, "y": 1.0}
+        await client.call_tool("write_semantic_data", far)
+        cells = grid.cells.copy()
+        cells[:, cells.shape[1] // 2 :] = -1
+        robot.grid = OccupancyGrid(cells=cells, resolution_m=grid.resolution_m)
+        text = await _blocked(client)
+    assert text.startswith("Nothing is known to be blocked")
+    assert "remembered place that the map shows. Else: remembered places that the map does" in text
+    assert 'W1 "attic": (6.00, 1.00) lies in unexplored space' in text
+
+
 async def test_a_gap_that_is_too_narrow_is_told(tmp_path: Path) -> None:
     robot = FakeRobot(grid_from_text(NARROW, resolution_m=0.15), pose=Pose(1.0, 0.6))
     async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:

@@ -2,6 +2,7 @@ import math
 from pathlib import Path
 
 import anyio
+import numpy as np
 import pytest
 from mcp_types import CallToolResult
 
@@ -9,11 +10,12 @@ from drawing import grid_from_text
 from failing_robot import FailingRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.session import Session
+from mapspeak.spatial import OccupancyGrid
 from served import MODES, connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio
@@ -105,6 +107,23 @@ async def test_a_goal_that_makes_no_sense_is_refused_with_the_next_step(
     assert result.is_error
     assert says in text_of(result)
     assert not robot.goals
+
+
+async def test_a_remembered_place_that_a_new_map_draws_a_cell_off_is_driven_to(
+    tmp_path: Path,
+) -> None:
+    fine = np.kron(two_rooms().cells, np.ones((5, 5), dtype=np.int8))
+    robot = FakeRobot(OccupancyGrid(cells=fine, resolution_m=0.05))
+    async with connect(robot, tmp_path) as client:
+        bench = {"name": "bench", "description": "", "x": 6.02, "y": 1.02}
+        await client.call_tool("write_semantic_data", bench)
+        cells = fine.copy()
+        cells[:, round(6.0 / 0.05) :] = -1
+        robot.grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+        result = await client.call_tool("navigate_to", {"place": "bench"})
+    assert not result.is_error, text_of(result)
+    (goal,) = robot.goals.values()
+    assert goal.point.distance_to(Point(6.02, 1.02)) < 0.1
 
 
 async def test_a_newer_goal_replaces_the_older_one(tmp_path: Path) -> None:

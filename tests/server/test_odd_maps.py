@@ -99,6 +99,7 @@ async def test_an_id_that_is_gone_says_what_became_of_it(tmp_path: Path) -> None
     assert "\nR2 | " in before
     gone = [text for text in answers if "no longer found" in text]
     assert len(gone) == 2, (after, answers)
+    assert "No longer there: D1, R1, R2 (now C1)." in after
 
 
 async def test_the_text_about_a_building_of_hundreds_of_rooms_stays_short(tmp_path: Path) -> None:

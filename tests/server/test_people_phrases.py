@@ -380,10 +380,11 @@ async def test_rooms_are_meant_by_how_many_doors_they_have(client: Client) -> No
     assert "No room has 2 doors" in none
 
 
-async def test_start_is_where_the_robot_was_first(client: Client) -> None:
+@pytest.mark.parametrize("words", ["start", "where I started", "the starting point"])
+async def test_start_is_where_the_robot_was_first(client: Client, words: str) -> None:
     began = (await _goal(client, "robot"))["pose"]
     await client.call_tool("navigate_to", {"place": "largest room"})
-    back = report_of(await client.call_tool("navigate_to", {"place": "start"}))
+    back = report_of(await client.call_tool("navigate_to", {"place": words}))
     assert (back["robot"]["x"], back["robot"]["y"]) == (began["x"], began["y"])
 
 

@@ -223,3 +223,11 @@ async def test_of_where_the_robot_stands_no_way_is_told_and_what_lies_in_another
     assert "Remembered within 5 m: W1 at 0.5 m, W2 in R1 at 3.0 m." in text
     assert "To go there" not in text
     assert "it stands there" not in text
+
+
+async def test_words_that_ask_for_what_fits_lead_to_what_finds_it(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        asked = await client.call_tool("navigate_to", {"place": "where I could wash my hands"})
+        named = await client.call_tool("navigate_to", {"place": "the blue lagoon"})
+    assert "find_place says more" in text_of(asked)
+    assert "look_at_map shows them" in text_of(named)

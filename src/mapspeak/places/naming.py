@@ -35,6 +35,10 @@ SPOT = re.compile(
 )
 ROBOT_NAMES = ("robot", "here")
 START = "start"
+STARTED = re.compile(
+    r"(?:the )?start(?:ing (?:point|place))?|where (?:i|you|we|it|the robot) (?:started|began)",
+    re.IGNORECASE,
+)
 """What the place is called where the robot, or a route, began."""
 
 
@@ -182,7 +186,7 @@ def _find_by_name(world: WorldModel, name: str) -> Place | None:
 def _read_spot(world: WorldModel, words: str) -> Place | None:
     if words.casefold() in ROBOT_NAMES:
         return Place("robot", Spot(world.robot.point, world.robot.yaw_rad))
-    if words.casefold() == START:
+    if STARTED.fullmatch(words):
         spot = Spot(world.start.point, world.start.yaw_rad)
         return Place(START, spot, "where the robot was when this map was first looked at")
     match = SPOT.fullmatch(words)

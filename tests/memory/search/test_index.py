@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from embedding import ConceptEmbedder
+from embedding import ConceptEmbedder, shipped_model
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, name_key
 from mapspeak.memory.search.answer import (
@@ -193,6 +193,18 @@ def test_what_is_more_like_a_thing_that_is_not_remembered_is_said_not_to_be() ->
 
     assert answer.verdict is Verdict.NOT_REMEMBERED
     assert answer.missing is not None
+
+
+@pytest.mark.parametrize("vectors", [None, TextVectors(shipped_model())])
+@pytest.mark.parametrize(("request_", "among"), [("rooms with a sink", "sl"), ("sinks", "l")])
+def test_what_is_remembered_by_its_whole_name_is_no_other_kind_that_is_missing(
+    vectors: TextVectors | None, request_: str, among: str
+) -> None:
+    entries = [Entry(id=name[0], kind=EntryKind.THING, name=name) for name in ("sink", "ladder")]
+
+    answer = EntryIndex(entries, vectors=vectors).find(request_, among=among)
+
+    assert answer.missing is None
 
 
 @pytest.mark.parametrize("find", [by_words, by_meaning])

@@ -8,7 +8,7 @@ remembered at all, are chances fitted to requests.
 
 import math
 import re
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import chain, count
@@ -47,6 +47,7 @@ from mapspeak.memory.search.wordindex import (
     content_stems,
     content_words,
     explain,
+    put_right,
 )
 
 WORDS_ONLY = "The search compares words only, no meanings."
@@ -211,7 +212,6 @@ class EntryIndex:
         order = self._order(asked.ratios, likely, limit)
         n_meant = self._count_meant(asked, order, likely)
         verdict, is_sure = self._judge(asked, order, n_meant)
-        is_missing = asked.missing is not None and _missing_ratio(asked, order) > 0
         said = self._words.score_ratios(words, WHOLE_WORD_WEIGHTS, size=len(asked.ratios))
         return Answer(
             query=query,
@@ -220,7 +220,7 @@ class EntryIndex:
             candidates=tuple(self._candidate(number, asked, said) for number in order[:limit]),
             n_meant=n_meant,
             is_sure=is_sure,
-            missing=asked.missing[0] if asked.missing is not None and is_missing else None,
+            missing=self._find_missing(asked, order, limit),
             limits=WORDS_ONLY if self._meanings is None else None,
         )
 
@@ -240,18 +240,18 @@ class EntryIndex:
 
     def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
         """Return the request with its spelling corrected, or the name that it resembles."""
-        put_right = _put_right(query, words)
-        letters = _letters_of(put_right)
+        spelt = put_right(query, words)
+        letters = _letters_of(spelt)
         is_known = letters in self._of_letters or letters in self._of_other
-        if is_known or find_kinds_called(put_right) or not any(each.is_doubtful for each in words):
-            return put_right
+        if is_known or find_kinds_called(spelt) or not any(each.is_doubtful for each in words):
+            return spelt
         if self._look_alikes is None:
             names = (" ".join(_words_of(n)) for each in self._entries.values() for n in each.names)
             self._look_alikes = LookAlikes(filter(None, names))
         likest = self._look_alikes.find(
             " ".join(_words_of(query)), least_ratio=_LEAST_NAME_LIKENESS, limit=1
         )
-        return likest[0] if likest and _says_no_more(query, likest[0]) else put_right
+        return likest[0] if likest and _says_no_more(query, likest[0]) else spelt
 
     def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
         common: tuple[AskedWords, ...] = ()
@@ -277,6 +277,15 @@ class EntryIndex:
         ratios[self._of_letters.find(_letters_of(query))] = _SAME_WORDS
         ratios[self._of_key.find(name_key(query))] = _SAME_NAME
         return _Asked(understood, words, common, ratios, part_ratios, missing)
+
+    def _find_missing(self, asked: _Asked, order: list[int], limit: int) -> str | None:
+        """Return a kind that is meant and not remembered; none by the whole name of what is."""
+        if asked.missing is None or _missing_ratio(asked, order) <= 0:
+            return None
+        said = set(content_stems(asked.request))
+        likest = self._order(asked.ratios, self._find_likely(asked.ratios, None), limit)
+        names = (set(content_stems(name)) for n in likest for name in self._entries[n].names)
+        return None if any(name and name <= said for name in names) else asked.missing[0]
 
     def _find_likely(self, ratios: Floats, among: Container[str] | None) -> IntArray:
         likely = np.flatnonzero(ratios > 0)
@@ -372,14 +381,6 @@ def _missing_ratio(asked: _Asked, order: list[int]) -> float:
     if not order:
         return math.inf
     return asked.missing[1] - float(asked.ratios[order[0]])
-
-
-def _put_right(query: str, words: Iterable[AskedWords]) -> str:
-    """Return the request with corrected words where only a misspelling explains them."""
-    for word in words:
-        if word.corrected != word.shown:
-            query = re.sub(rf"\b{re.escape(word.shown)}\b", word.corrected, query)
-    return query
 
 
 @lru_cache(maxsize=MOST_KEPT)

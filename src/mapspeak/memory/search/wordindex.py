@@ -376,3 +376,11 @@ def _weigh_words(texts: Texts) -> dict[str, float]:
 def _words_said(text: str) -> tuple[str, ...]:
     """Return the words of a text, each once; many records say the same."""
     return tuple(dict.fromkeys(word for _, word in split_words(text)))
+
+
+def put_right(query: str, words: Iterable[AskedWords]) -> str:
+    """Return the request with corrected words where only a misspelling explains them."""
+    for word in words:
+        if word.corrected != word.shown:
+            query = re.sub(rf"\b{re.escape(word.shown)}\b", word.corrected, query)
+    return query

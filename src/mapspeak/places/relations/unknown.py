@@ -9,7 +9,7 @@ from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
 from mapspeak.places.asking import RecallQuery, recall
 from mapspeak.places.candidate import RecallCandidate
-from mapspeak.places.naming import ARTICLE, ID, IDS, MOST_NAMED, find_elsewhere
+from mapspeak.places.naming import ARTICLE, ID, IDS, MOST_NAMED, REGION_ID, find_elsewhere
 from mapspeak.places.relations.grammar import KINDS, Several, Superlative, parse_relation
 from mapspeak.places.relations.vocabulary import COUNTS, ORDERS, RANKS, Kind, pattern
 from mapspeak.spatial.rooms import RoomClass
@@ -17,6 +17,8 @@ from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.reported import list_reported
 
 MOST_GUESSES = 3
+MOST_OF_A_NAME = 3
+"""Of more words, and no id, who says them asks for what fits, not for a place by its name."""
 OF_THE_MAP = pattern(rf"\b(?:{KINDS[Kind.DOOR]}|{KINDS[Kind.CORRIDOR]}|frontier)s?\b")
 """Who speaks of these means no place in whose description one of them stands."""
 
@@ -68,7 +70,8 @@ def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
     if not IDS.fullmatch(wanted) and (shown := _find_reported(world, wanted)) is not None:
         seen = f"Pictures show {quote_name(shown)}, which is not written down. If that is meant, "
         return f"{seen}use {f'nearest {shown}'!r}. {phrases}", NextStep.READ_MORE
-    return phrases, NextStep.SEE_PLACES
+    is_told = len(wanted.split()) > MOST_OF_A_NAME and not REGION_ID.search(wanted)
+    return phrases, NextStep.READ_MORE if is_told else NextStep.SEE_PLACES
 
 
 def _find_reported(world: WorldModel, wanted: str) -> str | None:

@@ -108,8 +108,10 @@ def _summary(view: MapView, told: Told) -> str:
     if told.is_first:
         lines.append(_say_map(world))
     else:
+        became = {each.id: join_words(each.became, "") for each in world.rooms.vanished}
         gone = told.find_gone(list_subjects(world))
-        lines += [f"No longer there: {', '.join(gone)}."] if gone else []
+        told_gone = [f"{each} (now {became[each]})" if became.get(each) else each for each in gone]
+        lines += [f"No longer there: {', '.join(told_gone)}."] if gone else []
         lines.append(AGAIN)
     if look.zoom is not None and look.around is not None:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"

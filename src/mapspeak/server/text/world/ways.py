@@ -1,7 +1,7 @@
 """Ways: what is in them, with why and until when, and how long they are, compared."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from itertools import groupby
 
@@ -13,7 +13,7 @@ from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.recall.events import leave_out_events, say_events, say_unplaced
-from mapspeak.places.relations.choosing import check_place, find_place, find_places
+from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place, find_places
 from mapspeak.places.standing import find_standing_point
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.offered import lead
@@ -25,16 +25,17 @@ from mapspeak.server.text.world.tables import say_floor, say_sizes
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedThing
+from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
 
 OF_THINGS = "Straight is to a thing itself, the path to where the robot would stand to see it."
 MOST_LINES = 12
 BORDERS = "borders with the unknown not offered"
+UNEXPLORED = "remembered places that the map does not show yet"
 FAILED = "goals that failed"
-MINOR = {BORDERS, FAILED}
-"""What keeps the robot from no known place."""
+MINOR = {BORDERS, UNEXPLORED, FAILED}
+"""What keeps the robot from no place that the map shows."""
 EVERYWHERE = (
-    "Nothing is known to be blocked: the robot gets to every room, door and remembered place."
+    "Nothing is known to be blocked: the robot gets to every room, door and remembered place"
 )
 MOST_WAYS = 30
 MOST_SIZES = 60
@@ -58,11 +59,13 @@ def describe_blocked(
         now: By the calendar; None where that is not known.
         now_s: Robot time.
     """
+    blocked, unexplored = _find_places_without_way(world)
     parts = {
         "events and closed areas": list(_say_closed(world, events, now)),
         "doors without a way": list(_say_doors(world)),
         "rooms without a way": list(_say_rooms(world)),
-        "remembered places without a way": list(_say_places(world)),
+        "remembered places without a way": list(_say_places(blocked)),
+        UNEXPLORED: list(_say_places(unexplored)),
         BORDERS: list(_say_borders(world)),
         FAILED: [_say_drive(drive, now_s) for drive in failed if _is_open(world, drive)],
     }
@@ -78,10 +81,12 @@ def describe_blocked(
 
 def _say_in_the_way(counts: Mapping[str, int]) -> str:
     """Say first whether the robot gets everywhere; how often what is by the way."""
+    shown = " that the map shows" if UNEXPLORED in counts else ""
+    everywhere = f"{EVERYWHERE}{shown}."
     if not counts:
-        return EVERYWHERE
+        return everywhere
     told = ", ".join(f"{what} ({n})" for what, n in counts.items())
-    return f"{EVERYWHERE} Else: {told}." if counts.keys() <= MINOR else f"In the way: {told}."
+    return f"{everywhere} Else: {told}." if counts.keys() <= MINOR else f"In the way: {told}."
 
 
 def _say_doubts(world: WorldModel, events: Sequence[Event], now: datetime | None) -> Iterator[str]:
@@ -123,11 +128,25 @@ def _say_rooms(world: WorldModel) -> Iterator[str]:
             yield f"{region.id}: {_why_no_way(world, Place(region.id, region))}"
 
 
-def _say_places(world: WorldModel) -> Iterator[str]:
-    for place in world.places:
-        if world.path_m(place.waypoint.pose.point) is None:
-            name = quote_name(place.waypoint.name)
-            yield f"{place.id} {name}: {_why_no_way(world, Place(place.id, place))}"
+def _find_places_without_way(
+    world: WorldModel,
+) -> tuple[list[CheckedGoal], list[CheckedGoal]]:
+    """Return the remembered places that something cuts off, and those that nobody has seen yet."""
+    checked = [
+        check_place(world, Place(place.id, place))
+        for place in world.places
+        if world.path_m(place.waypoint.pose.point) is None
+    ]
+    parts: tuple[list[CheckedGoal], list[CheckedGoal]] = ([], [])
+    for goal in checked:
+        parts[goal.check.verdict in (GoalVerdict.OFF_MAP, GoalVerdict.UNKNOWN)].append(goal)
+    return parts
+
+
+def _say_places(goals: Iterable[CheckedGoal]) -> Iterator[str]:
+    for goal in goals:
+        if isinstance(place := goal.place.thing, RememberedPlace):
+            yield f"{place.id} {quote_name(place.waypoint.name)}: {say_check(goal.check)}"
 
 
 def _why_no_way(world: WorldModel, place: Place) -> str:
