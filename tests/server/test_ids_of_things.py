@@ -7,7 +7,7 @@ import pytest
 from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.memory import SemanticMapStore, Waypoint
+from mapspeak.memory import LaserFan, SemanticMapStore, Waypoint
 from mapspeak.spatial import OccupancyGrid
 from remembering import EXTINGUISHER, LADDER, look, looks_at
 from served import connect, report_of, text_of
@@ -81,3 +81,29 @@ async def test_a_thing_that_is_forgotten_leaves_its_id_to_none_and_has_it_back(
         again = {"what": "ladder", "undo": True}
         assert not (await client.call_tool("forget", again)).is_error
         assert await _ids(client, "ladder") == {ladder}
+
+
+async def test_what_lies_off_the_map_so_far_is_where_its_record_has_it(tmp_path: Path) -> None:
+    seen = ("fire extinguisher", EXTINGUISHER)
+    by_range = look("east", 5.4, 1.5, seen, range_m=2.0)
+    met = LaserFan.read("from -4.0 to 4.0 deg at 2.2 2.1 2.0 3.4 3.4 m")
+    by_laser = replace(
+        by_range,
+        functional_landmarks=tuple(
+            replace(each, range_m=None, laser=met) for each in by_range.functional_landmarks
+        ),
+    )
+    for number, place in enumerate((by_range, by_laser)):
+        folder = tmp_path / f"{number}"
+        _remember(folder, place)
+        grid = two_rooms()
+        robot = FakeRobot(replace(grid, cells=grid.cells[:, :14].copy()))
+        async with connect(robot, folder) as client:
+            asked = {"query": "fire extinguisher"}
+            found = report_of(await client.call_tool("find_place", asked))
+            described = text_of(await client.call_tool("describe_place", {"place": "T1"}))
+        (_, _, said) = found["advice"].partition("not sure: ")
+        told = "he map does not show yet where it is; its record has it near "
+        assert said.startswith(f"t{told}(7.40, 1.50).")
+        assert f"T{told}7.40, 1.50." in described
+        assert found["candidates"][0]["position"] is None

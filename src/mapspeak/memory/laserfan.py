@@ -88,6 +88,12 @@ class LaserFan:
         said = " ".join(self._say(each) for each in self.ranges_m)
         return f"from {_decimals(first)} to {_decimals(last)} deg at {said} m"
 
+    def find_range_m(self, bearing_rad: float) -> float | None:
+        """Return how far the beam nearest to a bearing reached what it hit; None if it hit none."""
+        number = round((bearing_rad - self.first_rad) / self.step_rad)
+        range_m = self.ranges_m[number] if 0 <= number < len(self.ranges_m) else None
+        return None if range_m == math.inf else range_m
+
     def turned(self, turn_rad: float) -> "LaserFan":
         """Return the same beams from another heading.
 

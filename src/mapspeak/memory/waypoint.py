@@ -5,7 +5,7 @@ from datetime import datetime
 from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.frames import NO_FRAMES, FrameId, Frames
 from mapspeak.memory.laserfan import LaserFan
 from mapspeak.memory.quoting import clean_line, clean_text, name_key
@@ -65,6 +65,15 @@ class Landmark:
         _clean_lines(self, "purpose", "note", "picture", "range_from", "bearing_from")
         if self.bearing_rad is not None:
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
+
+    def told_from(self, pose: Pose) -> Point | None:
+        """Return where it was by its range, else by what the laser met in its direction."""
+        if self.bearing_rad is None:
+            return None
+        range_m = self.range_m
+        if range_m is None and self.laser is not None:
+            range_m = self.laser.find_range_m(self.bearing_rad)
+        return None if range_m is None else pose.point_at(self.bearing_rad, range_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
