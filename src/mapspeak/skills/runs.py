@@ -22,7 +22,7 @@ from mapspeak.skill import (
 )
 from mapspeak.skills.steps import Mission
 
-MOST_PICTURES = 12
+MOST_PICTURES = 40
 MOST_KEPT = 200
 MOST_AT_ONCE = 20
 BEGINS_S = 2.0

@@ -559,6 +559,16 @@ async def test_a_tree_that_cannot_be_run_is_refused_and_nothing_moves(
     assert fault in unsaved
 
 
+async def test_what_a_mission_looked_at_is_shown_by_its_id(tmp_path: Path) -> None:
+    async with missions(tmp_path) as caller:
+        told = await caller.ask("run_mission", tree="- look\n- drive: R2\n- look\n")
+        first, second = re.findall(r"picture=(P\d+)", told)
+        shown = await caller.client.call_tool("show_missions", {"picture": first})
+        refused = await caller.refuse("show_missions", picture="P99")
+    assert [each.type for each in shown.content] == ["image"]
+    assert f"These are: {first}, {second}." in refused
+
+
 @pytest.mark.parametrize("leaf", ["drive: R2", "look: R2", "wait: 100", "speak", "ask: Well?"])
 async def test_a_stop_in_any_leaf_is_the_next_command_without_waiting_for_anything(
     leaf: str, tmp_path: Path

@@ -52,6 +52,11 @@ async def fetch_ring(robot: Robot) -> LaserRing | None:
     )
 
 
+def show_picture(picture: CameraPicture) -> Image:
+    """Return a picture as an answer holds it."""
+    return Image(data=picture.data, format=picture.media_type.partition("/")[2])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSighting:
     """A picture of a camera, and its caption.
@@ -98,7 +103,7 @@ class CameraSighting:
     @property
     def image(self) -> Image:
         """The picture as a tool gives it."""
-        return Image(data=self.picture.data, format=self.picture.media_type.partition("/")[2])
+        return show_picture(self.picture)
 
 
 async def look_ahead(session: Session, camera: str | None = None) -> CameraSighting:

@@ -25,6 +25,7 @@ from mapspeak.server.text.skills import (
 )
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.caller import LONGEST_WAIT_S, WaitForEnd, find_reader, shorten_wait
+from mapspeak.server.tools.sightings import show_picture
 from mapspeak.server.tools.skills.book import WAIT, WAITS, SkillBook, is_long
 from mapspeak.server.tools.skills.leaves import AHEAD, BUILT_IN, PLACES
 from mapspeak.server.tools.toolset import ToolEffect, tool
@@ -67,9 +68,8 @@ Correction = Annotated[
 ]
 QuestionId = Annotated[str | None, Field(description="such as Q1; else the oldest", max_length=20)]
 Answer = Annotated[str | None, Field(description="left out, it shows the question", max_length=300)]
-Handle = Annotated[
-    str | None, Field(description="such as S1; the latest when left out", max_length=40)
-]
+Taken = Annotated[str | None, Field(description="such as P2, of a look", max_length=20)]
+Handle = Annotated[str | None, Field(description="such as S1; else the latest", max_length=40)]
 
 
 class SkillRunTools:
@@ -206,11 +206,8 @@ class MissionTools:
         if answer is not None:
             taken = self._book.runs.questions.answer(found, answer)
             return [f"{found.id} is answered: {taken}."]
-        shown: list[str | Image] = [say_question(found)]
-        if found.picture is not None:
-            media = found.picture.media_type.partition("/")[2]
-            shown.append(Image(data=found.picture.data, format=media))
-        return shown
+        picture = [] if found.picture is None else [show_picture(found.picture)]
+        return [say_question(found), *picture]
 
     @tool("Save a mission", ToolEffect.REMEMBERS)
     async def save_mission(
@@ -257,8 +254,15 @@ class MissionTools:
         return f"Saved {name} in {path}.\n{self._show(name)}"
 
     @tool("Show missions and skills", ToolEffect.READS)
-    async def show_missions(self, name: SavedName = None) -> str:
-        """List skills and saved missions, or show one mission as a tree with what it may do."""
+    async def show_missions(
+        self, name: SavedName = None, picture: Taken = None
+    ) -> str | list[str | Image]:
+        """List skills and saved missions, show one as a tree, or a picture that a mission took."""
+        if picture is not None:
+            kept = self._book.runs.questions.pictures
+            if (taken := kept.get(picture.strip().upper())) is None:
+                raise SkillError("It is not kept.", hint=f"These are: {', '.join(kept) or 'none'}.")
+            return [show_picture(taken)]
         if name is not None:
             return self._show(name)
         self._book.load_saved()
