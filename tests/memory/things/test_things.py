@@ -598,3 +598,40 @@ def test_views_that_only_seem_to_meet_beyond_what_nobody_saw_are_of_two_things()
     one = look("a", 0.879, 6.291, ("waste bin", Point(1.821, 4.8)))
     other = look("b", 6.723, 1.092, ("waste bin", Point(0.2, 2.411)))
     assert len(things_of(one, other, text="\n".join(unseen_between))) == 2
+
+
+@pytest.mark.parametrize("slit_col", [18, 19, 21, 22, 23, 25])
+def test_a_chair_of_a_hall_is_not_taken_for_one_that_a_slit_in_the_wall_would_show(
+    slit_col: int,
+) -> None:
+    def room(n_rows: int, table: slice, at_rows: range) -> list[str]:
+        row = "#" + "." * 58 + "#"
+        with_table = row[: table.start] + "#" * (table.stop - table.start) + row[table.stop :]
+        return [with_table if number in at_rows else row for number in range(n_rows)]
+
+    slit = "#" * slit_col + "." + "#" * (59 - slit_col)
+    hall, office = room(60, slice(18, 28), range(38, 46)), room(40, slice(16, 24), range(24, 31))
+    text = "\n".join(["#" * 60, *hall, slit, slit, *office, "#" * 60])
+    looks = [
+        Waypoint(
+            name=name,
+            pose=pose,
+            functional_landmarks=(
+                Landmark(
+                    label="chair",
+                    bearing_rad=pose.point.bearing_to(at),
+                    bearing_from="picture",
+                ),
+            ),
+        )
+        for name, pose, at in (
+            ("hall", Pose(2.4, 9.75, 0.0), Point(2.3, 6.1)),
+            ("office", Pose(2.8, 3.0, 0.0), Point(2.0, 1.3)),
+        )
+    ]
+
+    things = find_things(
+        SemanticMap(waypoints=tuple(looks)), grid_from_text(text, resolution_m=0.1)
+    ).things
+
+    assert sorted(thing.waypoints for thing in things) == [("hall",), ("office",)]

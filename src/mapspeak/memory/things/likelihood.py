@@ -14,6 +14,7 @@ from mapspeak.memory.things.sight import (
     SightMap,
     bearing_index,
     correct_by_laser,
+    find_far_with_another,
     find_farthest_beside,
     find_log_priors,
     look_around,
@@ -88,8 +89,10 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
     down, right = sight.rows[window] - row, sight.cols[window] - col
     ranges_m, angles = np.hypot(down, right) * res_m, np.arctan2(down, right)
     rays = bearing_index(angles)
-    is_near, is_over = ranges_m <= near_m[rays] + BODY_M, ranges_m <= far_m[rays] + BODY_M
-    is_far = ranges_m <= find_farthest_beside(far_m)[rays] + BODY_M
+    # A thing is wider than a slit that one ray alone slips through.
+    over_m = np.maximum(find_far_with_another(far_m), near_m)
+    is_near, is_over = ranges_m <= near_m[rays] + BODY_M, ranges_m <= over_m[rays] + BODY_M
+    is_far = ranges_m <= find_farthest_beside(over_m)[rays] + BODY_M
     seen_beyond = np.where(is_over, NOISE.seen_over_ratio, NOISE.seen_by_edge_ratio)
     rows, cols = np.nonzero(is_far)
     return Outlook(

@@ -197,6 +197,16 @@ def find_farthest_beside(far_m: FloatArray) -> FloatArray:
     return np.asarray(far_m[..., _BESIDE].max(axis=-1))
 
 
+def find_far_with_another(far_m: FloatArray) -> FloatArray:
+    """Return how far one sees along each ray and one next to it, too: through no mere slit.
+
+    Args:
+        far_m: By ray.
+    """
+    beside_m = np.maximum(np.roll(far_m, 1), np.roll(far_m, -1))
+    return np.asarray(np.minimum(far_m, beside_m))
+
+
 def are_opposite(looks: FloatArray, views: FloatArray) -> Mask:
     """Return True for each look (row) and point that is on no side from which the point was seen.
 
