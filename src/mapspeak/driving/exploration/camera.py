@@ -47,7 +47,7 @@ TURN_WORTH_M = 0.5
 """So much new wall in one picture is worth a turn where the robot stands."""
 DRIVE_WORTH_M = 1.0
 """So much new wall all around a place is worth a drive there."""
-WAY_WORTH = 4.0
+WAY_WORTH = 2.0
 """So many metres of way are worth a metre of new wall; see `benchmarks/views.py`."""
 MOST_ORDERED = 9
 """What is farther off does not come first, and all orders of these are looked at."""
