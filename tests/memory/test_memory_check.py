@@ -92,7 +92,7 @@ def _of_thing(whole: tuple[MemoryFinding, ...], thing: Thing) -> tuple[MemoryFin
 
 
 def test_what_is_asked_of_one_thing_is_what_all_findings_say_of_it_after_any_writes() -> None:
-    random = np.random.default_rng(7)
+    random = np.random.default_rng(3)
     memory, found, unseen = SemanticMap(waypoints=()), None, None
     kinds: set[FindingKind] = set()
     n_kept = 0
