@@ -154,7 +154,7 @@ async def measure_cost() -> tuple[float, float]:
         guard = make_guard(folder, Policy())
         tree = [{"parallel": [{"wait": 0.3}, {"check": {"battery_above": 0.0}}]}] * (N_LEAVES // 2)
         async with connect(folder, robot, robot, guard) as (client, _):
-            await _run(client, ["planned_by_nobody"], wait_s=0)
+            await _run(client, [{"wait": 0.1}], wait_s=5)
             # What a server loads at first is no part of it.
             await anyio.sleep(WARM_S)
             begun_s, cpu_s = time.perf_counter(), time.process_time()
