@@ -145,8 +145,8 @@ async def _run(client: Client, tree: Any, **more: Any) -> str:  # noqa: ANN401 -
 async def measure_cost() -> tuple[float, float]:
     """Return the share of a core that a mission of 100 leaves takes while it waits, and runs.
 
-    Its leaves wait a second each, on a robot in real time whose own world stands: what is counted
-    is the mission and the server, and not the simulator.
+    Half of its leaves wait 0.3 s each, on a robot in real time whose own world stands: what is
+    counted is the mission and the server, and not the simulator.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
