@@ -11,7 +11,8 @@ MapspeakError           everything below; carries what is wrong and what to do n
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 
 
@@ -103,3 +104,15 @@ class SemanticMapError(MapspeakError):
 
 class DamagedMapError(SemanticMapError):
     """A map that a memory has kept cannot be understood; it is there, and reading goes on."""
+
+
+@contextmanager
+def plain_errors() -> Iterator[None]:
+    """Let an error pass as it was raised, out of the group that a task group makes of it."""
+    try:
+        yield
+    except BaseExceptionGroup as group:
+        error: BaseException = group
+        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
+            error = error.exceptions[0]
+        raise error from error.__cause__

@@ -120,7 +120,9 @@ async def test_a_remembered_place_that_a_new_map_draws_a_cell_off_is_driven_to(
         cells = fine.copy()
         cells[:, round(6.0 / 0.05) :] = -1
         robot.grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+        blocked = text_of(await client.call_tool("what_is_blocked", {}))
         result = await client.call_tool("navigate_to", {"place": "bench"})
+    assert "bench" not in blocked
     assert not result.is_error, text_of(result)
     (goal,) = robot.goals.values()
     assert goal.point.distance_to(Point(6.02, 1.02)) < 0.1

@@ -18,7 +18,8 @@ from mapspeak.safety import (
     Patterns,
     Policy,
 )
-from mapspeak.skill import Arguments, SkillCode, SkillOutcome, SkillState, parameter
+from mapspeak.skill import Arguments, JsonValue, SkillCode, SkillOutcome, SkillState, parameter
+from mapspeak.skills.arguments import check_arguments
 from mapspeak.skills.guarding import SkillGate
 from skillmaking import FakeFacts, FakeSkill, never, spec, tell_nobody
 
@@ -162,3 +163,40 @@ async def test_a_clock_that_is_set_back_prolongs_no_skill() -> None:
     with anyio.fail_after(20.0):
         outcome = await guarded.run({}, tell_nobody)
     assert outcome.state is SkillState.TIMED_OUT
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "taken"),
+    [
+        ("integer", 3.0, 3),
+        ("integer", "3", 3),
+        ("number", "9007199254740993", 2**53 + 1),
+        ("number", 0.5, 0.5),
+        ("string", 3.0, "3"),
+        ("boolean", "true", True),
+        ("array", (1, 2), [1, 2]),
+    ],
+)
+def test_an_argument_is_taken_as_its_schema_wants_it(
+    kind: str, given: JsonValue, taken: JsonValue
+) -> None:
+    checked = check_arguments({"value": parameter(kind)}, {"value": given}, skill="it")["value"]
+    assert (checked, type(checked)) == (taken, type(taken))
+
+
+@pytest.mark.parametrize(
+    ("kind", "given"),
+    [
+        ("boolean", "yes"),
+        ("boolean", 1),
+        ("number", True),
+        ("number", 10**400),
+        ("number", "nan"),
+        ("integer", "3.5"),
+        ("array", "12"),
+        ("object", [1]),
+    ],
+)
+def test_what_is_no_value_of_a_schema_is_refused(kind: str, given: JsonValue) -> None:
+    with pytest.raises(SkillError, match="value cannot be"):
+        check_arguments({"value": parameter(kind)}, {"value": given}, skill="it")

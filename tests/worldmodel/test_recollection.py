@@ -228,5 +228,28 @@ def test_sessions_that_share_a_memory_give_no_id_to_two_things(tmp_path: Path) -
     assert sorted(_ids(again).values()) == [f"T{number}" for number in range(1, 9)]
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        "[" * 100_000,
+        '[1e999, "hall", "shelf", 0.0, null, 0]',
+        '[-3, "hall", "shelf", 0.0, null, 0]',
+        '[1000000000, "hall", "shelf", 0.0, null, 0]',
+        '[3, ["hall"], {}, 0.0, null, 0]',
+        "\x00\ufffd",
+    ],
+)
+def test_what_is_no_id_in_the_log_gives_none(tmp_path: Path, said: str) -> None:
+    (tmp_path / IDS_FILE).write_text(f"{said}\n", encoding="utf-8")
+    things = Recollector(kept=tmp_path).recollect(_remember(2), _draw())
+    assert sorted(_ids(things).values()) == [f"T{number}" for number in range(1, 5)]
+
+
+def test_a_log_of_ids_that_cannot_be_written_costs_no_answer(tmp_path: Path) -> None:
+    (tmp_path / IDS_FILE).mkdir()
+    things = Recollector(kept=tmp_path).recollect(_remember(2), _draw())
+    assert sorted(_ids(things).values()) == [f"T{number}" for number in range(1, 5)]
+
+
 def _ids(recollection: Recollection) -> dict[str, str]:
     return {each.thing.label: each.id for each in recollection.things}

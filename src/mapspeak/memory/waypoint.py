@@ -66,7 +66,7 @@ class Landmark:
         if self.bearing_rad is not None:
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
 
-    def told_from(self, pose: Pose) -> Point | None:
+    def recorded_point_from(self, pose: Pose) -> Point | None:
         """Return where it was by its range, else by what the laser met in its direction."""
         if self.bearing_rad is None:
             return None

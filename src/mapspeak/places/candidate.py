@@ -30,7 +30,7 @@ class RecallCandidate:
         position: Where it is; None where nobody noted a direction.
         uncertainty_m: The radius around that which holds it with 90 %; None without a position,
             and for a place.
-        told: Where the record of a thing puts it without a map, by a range or the laser.
+        recorded_point: Where the record of a thing has it without a map, by a range or the laser.
         is_guessed: Only one direction is known, and where the map ends it is taken to be.
         pose: Where the robot would stand: of a thing, near it and facing it where it can.
         is_faced: True when it would stand near it and face it.
@@ -47,7 +47,7 @@ class RecallCandidate:
     pictures: tuple[str, ...]
     position: Point | None
     uncertainty_m: float | None
-    told: Point | None
+    recorded_point: Point | None
     is_guessed: bool
     room_ids: tuple[str, ...]
     pose: Pose
@@ -118,7 +118,7 @@ def describe_candidate(
 ) -> RecallCandidate:
     """Return what is known of a place or thing, and how a robot would stand for it."""
     position: Point | None
-    told: Point | None = None
+    recorded_point: Point | None = None
     if isinstance(remembered, RememberedPlace):
         waypoint = remembered.waypoint
         name, position, uncertainty_m = waypoint.name, waypoint.pose.point, None
@@ -129,7 +129,7 @@ def describe_candidate(
     else:
         thing, views = remembered.thing, list(_list_views(world, remembered))
         name, position, uncertainty_m = thing.label, thing.position, thing.uncertainty_m
-        is_guessed, told = thing.is_guessed, thing.told
+        is_guessed, recorded_point = thing.is_guessed, thing.recorded_point
         seen_from, pictures = [each for each, _ in views], [view.picture for _, view in views]
         is_looked_for = find_overlook_of(world, remembered) is not None
         is_faced = world.find_approach(remembered) is not None and not is_looked_for
@@ -146,7 +146,7 @@ def describe_candidate(
         pictures=tuple(dict.fromkeys(filter(None, pictures))),
         position=position,
         uncertainty_m=uncertainty_m,
-        told=told,
+        recorded_point=recorded_point,
         is_guessed=is_guessed,
         room_ids=find_rooms_of(world, remembered),
         pose=pose,
@@ -178,7 +178,7 @@ def find_doubt(first: RecallCandidate, *, room_id: str | None) -> RecallDoubt | 
     if first.kind is EntryKind.PLACE:
         return RecallDoubt.DOUBTFUL_RECORD if first.trust.ratio < DOUBTFUL_RATIO else None
     if first.position is None or first.uncertainty_m is None:
-        return RecallDoubt.NOT_NOTED if first.told is None else RecallDoubt.NOT_ON_MAP
+        return RecallDoubt.NOT_NOTED if first.recorded_point is None else RecallDoubt.NOT_ON_MAP
     doubts = {
         RecallDoubt.CONTRADICTED: first.trust.ratio < DOUBTFUL_RATIO,
         RecallDoubt.LONG_AGO: first.trust.stayed_ratio < LEAST_STAYED_RATIO,

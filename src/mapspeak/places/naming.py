@@ -35,11 +35,12 @@ SPOT = re.compile(
 )
 ROBOT_NAMES = ("robot", "here")
 START = "start"
+"""What the place is called where the robot, or a route, began."""
 STARTED = re.compile(
     r"(?:the )?start(?:ing (?:point|place))?|where (?:i|you|we|it|the robot) (?:started|began)",
     re.IGNORECASE,
 )
-"""What the place is called where the robot, or a route, began."""
+"""What people call it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,21 @@ from mapspeak.worldmodel.revision import MapRevision
 
 EVERY_M = 1.0
 """Places to look from are this far from each other."""
+REDRAWN_M = 0.1
+"""A map that is drawn anew has a wall, or its first unseen cell, up to so far off."""
 BEFORE_M = 0.1
 """So near to the last floor before a thing nothing hides that."""
+
+
+def stand_again(world: WorldModel, pose: Pose) -> Pose:
+    """Return a remembered pose, or the nearest beside it that the robot gets to on this map."""
+    if world.path_m(pose.point) is not None:
+        return pose
+    steps_m = np.linspace(-REDRAWN_M, REDRAWN_M, 5).tolist()
+    beside = (Point(pose.x + x, pose.y + y) for x, y in itertools.product(steps_m, repeat=2))
+    reached = (each for each in beside if world.path_m(each) is not None)
+    nearest = min(reached, key=pose.point.distance_to, default=pose.point)
+    return Pose(nearest.x, nearest.y, pose.yaw_rad)
 
 
 def find_standing_point(world: WorldModel, region: Region) -> Point | None:

@@ -11,6 +11,7 @@ from mapspeak.places.standing import (
     choose_crossing,
     choose_standing_point,
     facing_in,
+    stand_again,
     stand_before,
 )
 from mapspeak.spatial.frontiers import Frontier
@@ -96,6 +97,8 @@ def standing_point(world: WorldModel, place: Place) -> Point:
             return choose_crossing(world, door)
         case RememberedThing() as remembered:
             return stand_before(world, remembered).point
+        case RememberedPlace(waypoint=waypoint):
+            return stand_again(world, waypoint.pose).point
         case _:
             return place.point
 
@@ -111,7 +114,7 @@ def stand_at(world: WorldModel, place: Place) -> Pose:
         case Frontier(pose=pose):
             return pose
         case RememberedPlace(waypoint=waypoint):
-            return waypoint.pose
+            return stand_again(world, waypoint.pose)
         case RememberedThing() as remembered:
             return stand_before(world, remembered)
         case Spot(point=point, yaw_rad=yaw_rad):

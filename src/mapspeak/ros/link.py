@@ -103,18 +103,6 @@ def wrong_type(name: str, found: str, given: str) -> LinkError:
 
 
 @contextmanager
-def plain_errors() -> Iterator[None]:
-    """Let an error pass as it was raised, out of the group that a task group makes of it."""
-    try:
-        yield
-    except BaseExceptionGroup as group:
-        error: BaseException = group
-        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
-            error = error.exceptions[0]
-        raise error from error.__cause__
-
-
-@contextmanager
 def environment_with(variables: Mapping[str, str]) -> Iterator[None]:
     """Let some variables have these values while the context lasts."""
     before = {name: os.environ.get(name) for name in variables}

@@ -13,9 +13,9 @@ from typing import Any, TypeVar
 import anyio
 from anyio.abc import TaskGroup
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, plain_errors
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
-from mapspeak.ros.link import Advertising, Patience, plain_errors, say_again
+from mapspeak.ros.link import Advertising, Patience, say_again
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.parameters import ParameterServices
 

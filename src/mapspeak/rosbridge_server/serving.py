@@ -11,9 +11,8 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.extensions.permessage_deflate import ServerPerMessageDeflateFactory
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, plain_errors
 from mapspeak.robot import Robot
-from mapspeak.ros.link import plain_errors
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.conversation import LONGEST_MESSAGE, ClientConversation
 from mapspeak.rosbridge_server.hub import Outbox

@@ -11,7 +11,10 @@ from mapspeak.errors import SkillError, say_nearest
 from mapspeak.memory.quoting import quote
 from mapspeak.skill import Arguments, JsonValue, Schema
 
+FLAGS = {"true": True, "false": False}
 MOST_SHOWN = 60
+MOST_DIGITS = 309
+"""No number that a robot takes has more."""
 SAID = {
     "number": "a number",
     "integer": "a whole number",
@@ -39,8 +42,8 @@ MOST_NAMED = 12
 FULL_DEPTH = 8
 
 
-def _refuse_flag(value: JsonValue) -> JsonValue:
-    return None if isinstance(value, bool) else value
+def _refuse_others(value: JsonValue) -> JsonValue:
+    return None if isinstance(value, bool) or len(str(value)) > MOST_DIGITS else value
 
 
 def _write_number(value: JsonValue) -> JsonValue:
@@ -48,10 +51,10 @@ def _write_number(value: JsonValue) -> JsonValue:
 
 
 CONVERSIONS: Mapping[str | None, TypeAdapter[Any]] = {
-    "number": TypeAdapter(Annotated[FiniteFloat, BeforeValidator(_refuse_flag)]),
-    "integer": TypeAdapter(Annotated[int, BeforeValidator(_refuse_flag)]),
+    "number": TypeAdapter(Annotated[int | FiniteFloat, BeforeValidator(_refuse_others)]),
+    "integer": TypeAdapter(Annotated[int, BeforeValidator(_refuse_others)]),
     "string": TypeAdapter(Annotated[str, BeforeValidator(_write_number)]),
-    "boolean": TypeAdapter(bool),
+    "boolean": TypeAdapter(Annotated[bool, BeforeValidator(lambda said: FLAGS.get(plain(said)))]),
     "array": TypeAdapter(list[Any]),
     "object": TypeAdapter(dict[str, Any]),
     "base64": TypeAdapter(str),
@@ -107,9 +110,8 @@ def check_value(schema: Schema, value: JsonValue, *, where: str, what: str) -> J
     return fitting
 
 
-def _kind_of(schema: Schema) -> str | None:
-    kind: str | None = schema.get("contentEncoding", schema.get("type"))
-    return kind
+def _kind_of(schema: Schema) -> JsonValue:
+    return schema.get("contentEncoding", schema.get("type"))
 
 
 def _is_allowed(schema: Schema, value: JsonValue) -> bool:

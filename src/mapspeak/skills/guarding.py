@@ -10,8 +10,7 @@ from typing import Protocol, TypeVar
 
 import anyio
 
-from mapspeak.errors import SkillError
-from mapspeak.ros.link import plain_errors
+from mapspeak.errors import SkillError, plain_errors
 from mapspeak.safety import Guard, RunSkill, covered_by
 from mapspeak.skill import (
     Arguments,
@@ -51,7 +50,7 @@ MODIFIERS = frozenset({"not", "within_m", "within_s"})
 LOOKS_S = (0.05, 0.25)
 """The shortest and longest wall time between two looks at the robot's clock."""
 FASTEST = 20
-"""Times as fast as the wall clock, a robot's clock is read in time for a limit."""
+"""A robot's clock may run so many times as fast as the wall's, and no limit is kept late."""
 STILL_S = 1.0
 """Wall time after which a clock that shows the same stands still."""
 T = TypeVar("T")

@@ -17,6 +17,8 @@ from mapspeak.memory import Landmark, Waypoint, name_key
 from mapspeak.memory.things.thing import Thing, View
 
 IDS_FILE = "things.ids"
+LARGEST = 10**8
+"""A larger number in the log is no work of ours, and its id would be none that is read."""
 
 ViewKey = tuple[str, str, float | None, float | None, int]
 """The `name_key` of the place, label, bearing and range; and the number among its equals there."""
@@ -127,9 +129,10 @@ class ThingIds:
             if said and not said.endswith(b"\n"):
                 self._n_read += log.write(b"\n")
         for line in said.splitlines():
-            with contextlib.suppress(ValueError, TypeError):
+            with contextlib.suppress(ValueError, TypeError, OverflowError, RecursionError):
                 number, place, label, bearing_rad, range_m, nth = json.loads(line)
-                self._take({(place, label, bearing_rad, range_m, nth): int(number)})
+                if 1 <= int(number) <= LARGEST:
+                    self._take({(place, label, bearing_rad, range_m, nth): int(number)})
 
     def _take(self, numbers: Mapping[ViewKey, int]) -> None:
         self.numbers.update(numbers)

@@ -64,7 +64,7 @@ async def test_a_service_is_a_tool_with_its_own_typed_arguments(
     async with exposed(system, tmp_path) as caller:
         tools = await caller.until(lambda tools: "tool_light" in tools)
         answer = await caller.ask("tool_light", data=True)
-        refused = await caller.refuse("tool_light", data="maybe")
+        refused = await caller.refuse("tool_light", data="yes")
         stranger = await caller.refuse("tool_light", date=True)
         failed = await caller.ask("tool_light", data=False)
     assert tools["tool_light"].input_schema == {
@@ -73,7 +73,7 @@ async def test_a_service_is_a_tool_with_its_own_typed_arguments(
     }
     assert "/tool/light" in (tools["tool_light"].description or "")
     assert "succeeded" in answer
-    assert "data cannot be 'maybe'. Give true or false" in refused
+    assert "data cannot be 'yes'. Give true or false" in refused
     assert "Did you mean data?" in stranger
     assert "failed" in failed
     assert 'The robot says: "as you say"' in failed

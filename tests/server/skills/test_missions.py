@@ -566,7 +566,7 @@ async def test_what_a_mission_looked_at_is_shown_by_its_id(tmp_path: Path) -> No
         shown = await caller.client.call_tool("show_missions", {"picture": first})
         refused = await caller.refuse("show_missions", picture="P99")
     assert [each.type for each in shown.content] == ["image"]
-    assert f"These are: {first}, {second}." in refused
+    assert f"Kept: {first}, {second}." in refused
 
 
 @pytest.mark.parametrize("leaf", ["drive: R2", "look: R2", "wait: 100", "speak", "ask: Well?"])

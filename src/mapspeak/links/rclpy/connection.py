@@ -10,7 +10,7 @@ from anyio.from_thread import BlockingPortal
 from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, plain_errors
 from mapspeak.links.endpoints import (
     FIRST_SIGN_S,
     LONGEST_LOOK_S,
@@ -26,7 +26,7 @@ from mapspeak.links.rclpy.endpoints import RclpyReader, RclpyService, RclpyWrite
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
 from mapspeak.ros.activity import Subscription
-from mapspeak.ros.link import Patience, plain_errors
+from mapspeak.ros.link import Patience
 from mapspeak.ros.messages.fields import NANOSECONDS, bare_type, check_name
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosConnection, keep_open
 

@@ -392,5 +392,5 @@ def _view(sighting: WeighedView, position: Point | None) -> View:
         place=place,
         far_m=place.distance_to(position) if position and has_way else None,
         off_rad=_off_rad(pose, bearing_rad or 0.0, position) if position and has_way else None,
-        told=sighting.landmark.told_from(pose),
+        recorded_point=sighting.landmark.recorded_point_from(pose),
     )

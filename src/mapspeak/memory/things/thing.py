@@ -101,7 +101,7 @@ class View:
         far_m: From there to the thing; None where the view says no direction or the thing has no
             position.
         off_rad: How far the view points past the thing, without a sign; None as before.
-        told: Where the record puts it without a map: by its range, else by what the laser met.
+        recorded_point: Where the record has it without a map: by its range, else by the laser.
     """
 
     waypoint: str
@@ -109,7 +109,7 @@ class View:
     place: Point
     far_m: float | None = None
     off_rad: float | None = None
-    told: Point | None = None
+    recorded_point: Point | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,9 +149,10 @@ class Thing:
         return self.position is not None and self.n_agreeing < 2 and not has_range
 
     @property
-    def told(self) -> Point | None:
-        """Where the first record that says so puts it without a map."""
-        return next((view.told for view in self.supporting if view.told is not None), None)
+    def recorded_point(self) -> Point | None:
+        """Where the first record that says so has it without a map."""
+        points = (view.recorded_point for view in self.supporting)
+        return next((each for each in points if each is not None), None)
 
     @property
     def waypoints(self) -> tuple[str, ...]:

@@ -19,10 +19,7 @@ from mapspeak.places.ways import stand_at
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
-from mapspeak.worldmodel.remembered import RememberedPlace, RememberedThing
-
-REDRAWN_M = 0.1
-"""A map that is drawn anew may have a wall or its first unseen cell so far off."""
+from mapspeak.worldmodel.remembered import RememberedThing
 
 
 def find_place(world: WorldModel, words: str) -> Place:
@@ -197,10 +194,6 @@ def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None
     if yaw_deg is not None:
         pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
     check = check_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
-    near, is_remembered = check.nearest, isinstance(place.thing, RememberedPlace)
-    if is_remembered and near is not None and near.point.distance_to(pose.point) <= REDRAWN_M:
-        pose = Pose(near.x, near.y, pose.yaw_rad)
-        check = check_goal(world.grid, world.distances, pose)
     is_free = yaw_deg is None and not _has_heading(place)
     if check.nearest is not None and is_free:
         check = replace(check, nearest=arrival_pose(world, check.nearest.point))

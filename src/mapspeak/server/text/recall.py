@@ -42,7 +42,7 @@ LOOK_AGAIN = (
 DOUBTS = {
     RecallDoubt.DOUBTFUL_RECORD: "its record is doubtful",
     RecallDoubt.NOT_NOTED: "where it is was not noted",
-    RecallDoubt.NOT_ON_MAP: "the map does not show yet where it is; its record has it near {told}",
+    RecallDoubt.NOT_ON_MAP: "the map does not show yet where it is; its record has it near {there}",
     RecallDoubt.CONTRADICTED: "what was noted of it does not go together",
     RecallDoubt.LONG_AGO: "it was last seen long ago for what it is",
     RecallDoubt.FEW_VIEWS: "no two good views of it agree so far",
@@ -167,8 +167,8 @@ def _say_doubt(first: RecallCandidate, doubt: RecallDoubt) -> str:
     if first.is_guessed and doubt in (RecallDoubt.FEW_VIEWS, RecallDoubt.IMPRECISE):
         return f"its place is {say_guess(first.uncertainty_m or 0.0)}"
     rooms = " or ".join(first.room_ids) or "no room"
-    told = "" if first.told is None else say_spot(first.told)
-    return DOUBTS[doubt].format(off_m=first.uncertainty_m, rooms=rooms, told=told)
+    there = "" if first.recorded_point is None else say_spot(first.recorded_point)
+    return DOUBTS[doubt].format(off_m=first.uncertainty_m, rooms=rooms, there=there)
 
 
 def _say_others(n_others: int) -> str:

@@ -77,8 +77,8 @@ def thing_lines(
         yield f"Also called {_quote_all(thing.other_labels)}."
     if thing.purposes:
         yield f"For {_quote_all(thing.purposes)}."
-    if thing.position is None and thing.told is not None:
-        there = say_point(thing.told)
+    if thing.position is None and thing.recorded_point is not None:
+        there = say_point(thing.recorded_point)
         yield f"The map does not show yet where it is; its record has it near {there}."
     elif thing.position is None:
         yield "Where it is was not noted: no view says a direction."

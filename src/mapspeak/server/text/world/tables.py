@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
 from mapspeak.memory.quoting import quote
-from mapspeak.places.standing import choose_standing_point, find_standing_point
+from mapspeak.places.standing import choose_standing_point, find_standing_point, stand_again
 from mapspeak.server.text.wording import (
     build_table,
     join_words,
@@ -256,7 +256,7 @@ def _place_row(world: WorldModel, place: RememberedPlace) -> Sequence[str]:
         place.id,
         quote(shorten(waypoint.name)),
         f"{say_point(waypoint.pose.point)}, {waypoint.pose.yaw_deg + 0.0:.0f} deg",
-        say_path(world.path_m(waypoint.pose.point)),
+        say_path(world.path_m(stand_again(world, waypoint.pose).point)),
         world.find_room_id(waypoint.pose.point) or "-",
         quote(shorten(labels)) if labels else "-",
     )

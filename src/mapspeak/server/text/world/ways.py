@@ -14,7 +14,7 @@ from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.recall.events import leave_out_events, say_events, say_unplaced
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place, find_places
-from mapspeak.places.standing import find_standing_point
+from mapspeak.places.standing import find_standing_point, stand_again
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import build_table, join_words, say_path, say_point, shorten
@@ -135,7 +135,7 @@ def _find_places_without_way(
     checked = [
         check_place(world, Place(place.id, place))
         for place in world.places
-        if world.path_m(place.waypoint.pose.point) is None
+        if world.path_m(stand_again(world, place.waypoint.pose).point) is None
     ]
     parts: tuple[list[CheckedGoal], list[CheckedGoal]] = ([], [])
     for goal in checked:

@@ -103,9 +103,8 @@ class SkillBook:
     def find(self, name: str) -> Skill:
         """Return a skill by its name; SkillError where there is none now."""
         if (found := self.skills.get(name)) is None:
-            hint = (
-                say_nearest(name, self.skills).rstrip() or f"There are: {', '.join(self.skills)}."
-            )
+            hint = say_nearest(name, self.skills).rstrip()
+            hint = hint or f"There are: {', '.join(self.skills)}."
             raise SkillError(f"There is no skill {name[:60]!r}.", hint=hint)
         return found
 

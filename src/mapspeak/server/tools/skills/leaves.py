@@ -140,12 +140,11 @@ class Leaves:
         """Return True where the robot is near a place, or in its room."""
         world = await self.session.fetch_world_model()
         here = (await self.session.robot.fetch_pose()).pose.point
-        within_m: float = wanted.get("within_m", 1.0)
 
         def judge() -> bool:
             there = find_place(world, wanted[name]).point
             if name == "near":
-                return here.distance_to(there) <= within_m
+                return bool(here.distance_to(there) <= wanted.get("within_m", 1.0))
             room_id = world.find_room_id(there)
             return room_id is not None and room_id == world.find_room_id(here)
 

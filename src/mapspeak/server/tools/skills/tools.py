@@ -261,7 +261,7 @@ class MissionTools:
         if picture is not None:
             kept = self._book.runs.questions.pictures
             if (taken := kept.get(picture.strip().upper())) is None:
-                raise SkillError("It is not kept.", hint=f"These are: {', '.join(kept) or 'none'}.")
+                raise SkillError("No such picture.", hint=f"Kept: {', '.join(kept) or 'none'}.")
             return [show_picture(taken)]
         if name is not None:
             return self._show(name)
